@@ -30,11 +30,12 @@ ui: setup             # what `sling flow` does, in a browser on this machine: ht
 test: setup           # the tests
 	.venv/bin/python -m pytest
 
-lint: setup           # ruff: rules and format; basedpyright: types; codespell
+lint: setup           # ruff: rules and format; basedpyright: types; codespell; words
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/basedpyright
 	.venv/bin/codespell
+	.venv/bin/python tools/vocabulary.py
 
 docs: setup           # the pages as a site, build/site/index.html; broken links fail
 	@.venv/bin/pip install --disable-pip-version-check -q -e '.[docs]' -c constraints.txt

@@ -52,8 +52,8 @@ def likely(found: dict[str, float], usual: float) -> str:
 
 def of_a_band(name: str, unit: str, units: dict[str, float], usual: float) -> Callable:
     """A type: a number of params.yaml's `bands`, within the range that it has there."""
-    kept = BandParams.model_fields[name].metadata
-    limits = next(one for one in kept if isinstance(one, Range))
+    retained = BandParams.model_fields[name].metadata
+    limits = next(one for one in retained if isinstance(one, Range))
     return quantity(unit, limits.low, limits.high, units, usual)
 
 

@@ -172,10 +172,10 @@ def setup(arguments: argparse.Namespace) -> Done:
     """Asks at a terminal where nothing is given."""
     from app import setup
 
-    told = {name: getattr(arguments, name) for name in kinds.MEASURED}
-    measured = setup.LabMeasures(**told)
+    summary = {name: getattr(arguments, name) for name in kinds.MEASURED}
+    measured = setup.LabMeasures(**summary)
     if measured.nothing and sys.stdin.isatty():
-        done = setup.set_up(setup.asked(), agreed=setup.confirmed)
+        done = setup.set_up(setup.requested(), agreed=setup.confirmed)
     else:
         done = setup.set_up(measured)
     return kinds.shown(done, True) if arguments.json else setup.shown(done)
@@ -226,7 +226,7 @@ def plan(arguments: argparse.Namespace) -> Done:
         pull=arguments.pull,
         precondition=arguments.precondition,
         pulls=arguments.pulls,
-        told=say,
+        progress=say,
     )
     files = plan.write(arguments.out or Layout().plans(band), arguments.rate)
     return plan.to_json(files) if arguments.json else plan.to_text(files)
@@ -278,8 +278,8 @@ def aim(arguments: argparse.Namespace) -> Done:
         refusal = f"no draw for {arguments.target:g} m: {why}; --force answers all the same"
         if not arguments.json:
             raise Refusal(refusal)
-        told = {"refused": refusal, "warnings": safety.as_json(answer["warnings"])}
-        return kinds.shown(told, True), REFUSED
+        summary = {"refused": refusal, "warnings": safety.as_json(answer["warnings"])}
+        return kinds.shown(summary, True), REFUSED
     return safety.shown(posed(answer, params, band), arguments.json)
 
 

@@ -43,10 +43,10 @@ def verify(arguments: argparse.Namespace) -> Done:
     JSON,
 )
 def bench(arguments: argparse.Namespace) -> Done:
-    from validation.benchmarks.bench import asked, bench
+    from validation.benchmarks.bench import bench, requested
 
     try:
-        what = asked(arguments)
+        what = requested(arguments)
     except argparse.ArgumentTypeError as error:
         return arguments.refuse(str(error))  # which exits
     return bench(arguments, what)

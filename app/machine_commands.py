@@ -26,7 +26,7 @@ def flow(arguments: argparse.Namespace) -> Done:
     from pipeline.params import load
 
     if Path("stages").is_dir():  # whose scripts read params.yaml
-        load()  # a mistake in it is told once, and not by each of them
+        load()  # a mistake in it is reported once, and not by each of them
     root, workers, gpus = Path.cwd(), arguments.workers, arguments.gpus
     if arguments.cluster is None:
         return flow.run(root, workers=workers, gpus=gpus)

@@ -52,7 +52,7 @@ def observe(
 
     Returns:
         `file`, `launches` in it, `measured_m` of this one, what `known` says `before` and `after`,
-        and `warnings`, which are told on stderr before stages run.
+        and `warnings`, which are printed on stderr before stages run.
 
     Raises:
         UserError: It can be no launch, or is known already, and nothing is written; or a stage
@@ -151,13 +151,13 @@ def softened(
     if not further(params.bands[band], params.setup, before, float(np.hypot(*draw))):
         return
     about = params.methods[method]
-    told = "the launches after it count as of the softened band"
+    note = "the launches after it count as of the softened band"
     if about.law != RUBBER or about.fixed.get("softening") == 0:
-        told = f"{method} leaves that out, a new recording and `sling drift` tell by how much"
+        note = f"{method} leaves that out, a new recording and `sling drift` tell by how much"
     yield Hazard(
         "stretch",
         f"this launch drew {band} to {np.hypot(*draw):.3f} m, {before:.3f} m was the most before:"
-        f" rubber softens up to its largest stretch; {told}",
+        f" rubber softens up to its largest stretch; {note}",
     )
 
 
@@ -182,17 +182,17 @@ def known(
     samples = load_samples(layout.confidence(band, method), parameters_of(content))
     launcher = simulator(params, band, content, root=root)
     once = launcher(np.array([draw]))
-    told = {"landing_m": None, "interval_90_m": None, "failure": once.failure[0]}
+    note = {"landing_m": None, "interval_90_m": None, "failure": once.failure[0]}
     if once.failure[0] is None:
-        told["landing_m"] = float(once.landing_y[0])
+        note["landing_m"] = float(once.landing_y[0])
         spread = params.trials.actuation_error if error is None else error
-        told["interval_90_m"] = interval_90(launcher, draw, samples, spread)
-    told["returned_share"] = content.get("returned_share", 1.0)
+        note["interval_90_m"] = interval_90(launcher, draw, samples, spread)
+    note["returned_share"] = content.get("returned_share", 1.0)
     ends = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
-    told["share_90"] = (
+    note["share_90"] = (
         None if samples is None else np.quantile(samples.column("returned_share"), ends).tolist()
     )
-    return told
+    return note
 
 
 def policy_stage(params: Params, band: str, method: str) -> str:
@@ -209,10 +209,10 @@ def shown(answer: dict) -> str:
     if removed := answer.get("removed"):
         lines.append("taken out: the draw to {:g}, {:g}".format(*removed["draw"]))
     for when in ("before", "after"):
-        if told := answer[when]:
-            share = _with_ends(told["returned_share"], told["share_90"], "")
-            landed = told["failure"] and f"fails in simulation: {told['failure']}"
-            landed = landed or _with_ends(told["landing_m"], told["interval_90_m"], " m")
+        if note := answer[when]:
+            share = _with_ends(note["returned_share"], note["share_90"], "")
+            landed = note["failure"] and f"fails in simulation: {note['failure']}"
+            landed = landed or _with_ends(note["landing_m"], note["interval_90_m"], " m")
             lines.append(f"{when:6}  landing {landed}, returned share {share}")
     nothing = "" if answer["after"] else "; nothing has run"
     lines.append(f"measured  {answer['measured_m']:.3f} m{nothing}")
@@ -220,5 +220,5 @@ def shown(answer: dict) -> str:
 
 
 def _with_ends(value: float, ends: list[float] | None, unit: str) -> str:
-    told = "" if ends is None else f" (90 %: {ends[0]:.3f} to {ends[1]:.3f}{unit})"
-    return f"{value:.3f}{unit}{told}"
+    note = "" if ends is None else f" (90 %: {ends[0]:.3f} to {ends[1]:.3f}{unit})"
+    return f"{value:.3f}{unit}{note}"

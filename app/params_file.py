@@ -18,16 +18,16 @@ def edited(text: str, change: Callable[[CommentedMap], object]) -> str:
     from dvc.utils.serialize import dumps_yaml, loads_yaml, parse_yaml_for_update
 
     lines = text.splitlines()
-    kept = [line for line in lines if not _is_aside(line)]
-    if loads_yaml("\n".join(kept)) != loads_yaml(text):  # a text over several lines has such lines
-        kept = lines
-    content = cast(CommentedMap, parse_yaml_for_update("\n".join(kept), "params.yaml"))
+    plain = [line for line in lines if not _is_aside(line)]
+    if loads_yaml("\n".join(plain)) != loads_yaml(text):  # a text over several lines has such lines
+        plain = lines
+    content = cast(CommentedMap, parse_yaml_for_update("\n".join(plain), "params.yaml"))
     change(content)
     _lists_as_dvc_has_them(content)
     settled = dumps_yaml(parse_yaml_for_update(dumps_yaml(content), "params.yaml"))
-    if kept is lines:
+    if plain is lines:
         return settled
-    return "".join(f"{line}\n" for line in _with_asides(lines, kept, settled.splitlines()))
+    return "".join(f"{line}\n" for line in _with_asides(lines, plain, settled.splitlines()))
 
 
 def _is_aside(line: str) -> bool:
@@ -35,8 +35,8 @@ def _is_aside(line: str) -> bool:
     return not line.strip() or line.lstrip().startswith("#")
 
 
-def _with_asides(lines: list[str], kept: list[str], after: list[str]) -> Iterator[str]:
-    """`after`, which was made of `kept`, with the other lines of `lines` above what they were."""
+def _with_asides(lines: list[str], plain: list[str], after: list[str]) -> Iterator[str]:
+    """`after`, which was made of `plain`, with the other lines of `lines` above what they were."""
     above: list[list[str]] = [[]]
     for line in lines:
         if _is_aside(line):
@@ -44,7 +44,7 @@ def _with_asides(lines: list[str], kept: list[str], after: list[str]) -> Iterato
         else:
             above.append([])
     here = [[] for _ in after]
-    for _, was, end, now, last in SequenceMatcher(None, kept, after, False).get_opcodes():
+    for _, was, end, now, last in SequenceMatcher(None, plain, after, False).get_opcodes():
         for n in range(min(end - was, last - now)):
             here[now + n] = above[was + n]
     for asides, line in zip(here, after, strict=True):

@@ -39,15 +39,15 @@ def reset(keys: Sequence[str], path: Path | str = "params.yaml") -> list[str]:
     except (OSError, UnicodeDecodeError, YAMLError) as error:
         raise UserError(f"{path}: cannot be read ({one_line(error)})") from error
     committed = YAML(typ="safe").load(_committed(path))
-    asked = [tuple(key.split(".")) for key in keys]
+    requested = [tuple(key.split(".")) for key in keys]
     leaves = dict(_leaves(committed))
-    for key in asked:
+    for key in requested:
         if not any(_within(leaf, key) for leaf in leaves):
             raise UserError(f"{'.'.join(key)}: the last commit's {path.name} has no such key")
     changed = {}
     for leaf, value in leaves.items():
         mine = any(_within(leaf, key) for key in YOURS)
-        wanted = any(_within(leaf, key) for key in asked) if asked else not mine
+        wanted = any(_within(leaf, key) for key in requested) if requested else not mine
         if wanted and _value(now, leaf) != value:
             changed[leaf] = value
     if not changed:

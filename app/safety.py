@@ -21,7 +21,7 @@ from stages.start import stage_of, unmounted
 
 MISS = 0.05  # m from the target, in simulation, from which no pose is given
 ROUNDING = 1e-3  # of a stretch
-TOLD = 3  # changed keys at most
+MOST_SHOWN = 3  # changed keys at most
 
 About = Literal[
     "box", "stretch", "force", "confidence", "params", "mounting", "target", "miss", "failure",
@@ -48,7 +48,7 @@ def as_json(hazards: Iterable[Hazard]) -> list[dict[str, str]]:
 
 
 def shown(answer: Mapping[str, Any], to_json: bool) -> str:
-    """An answer with its `warnings`, which are told first: as one JSON object, or as lines."""
+    """An answer with its `warnings`, which are printed first: as one JSON object, or as lines."""
     hazards = answer["warnings"]
     tell(hazards)
     if to_json:
@@ -73,12 +73,12 @@ def of_draw(params: Params, band: str, draw: tuple[float, float], root: Path) ->
         yield Hazard("stretch", f"{folder} is missing, so nothing tells how far the band was drawn")
         return
     sizes = params.setup.fork_width, params.bands[band].rest_length
-    asked = float(stretch_of(np.array([[0.0, *draw]]), *sizes)[0])
+    requested = float(stretch_of(np.array([[0.0, *draw]]), *sizes)[0])
     recorded = recorded_stretch(episodes, *sizes)
-    if asked > recorded + ROUNDING:
+    if requested > recorded + ROUNDING:
         yield Hazard(
             "stretch",
-            f"the draw stretches the band by {100 * (asked - 1):.1f} %, its recordings by"
+            f"the draw stretches the band by {100 * (requested - 1):.1f} %, its recordings by"
             f" {100 * (recorded - 1):.1f} % at most: force and landing are extrapolated",
         )
 
@@ -148,10 +148,10 @@ def of_mounting(params: Params, band: str, root: Path) -> list[Hazard]:
 
 
 def _of_changes(changes: list[Change], done: str, mended: str) -> Iterator[Hazard]:
-    for change in changes[:TOLD]:
+    for change in changes[:MOST_SHOWN]:
         yield Hazard("params", f"params.yaml: {change}, since {done}: {mended}")
-    if len(changes) > TOLD:
-        names = ", ".join(change.key for change in changes[TOLD:])
+    if len(changes) > MOST_SHOWN:
+        names = ", ".join(change.key for change in changes[MOST_SHOWN:])
         yield Hazard("params", f"params.yaml has changed since {done} also in {names}")
 
 

@@ -77,34 +77,34 @@ QUESTIONS = {
 }
 
 
-def asked(answer: Callable[[str], str] = input) -> LabMeasures:
+def requested(answer: Callable[[str], str] = input) -> LabMeasures:
     """What a user says at a terminal; an empty answer leaves what is there.
 
     Args:
         answer: Given a question, gives the line that is typed.
     """
-    told: dict[str, Any] = {}
+    answers: dict[str, Any] = {}
     say("Enter alone leaves what params.yaml has.")
     for name, question in QUESTIONS.items():
         while text := answer(f"{question}: ").strip():
             try:
-                told[name] = MEASURED[name][0](text)
+                answers[name] = MEASURED[name][0](text)
                 break
             except ArgumentTypeError as error:
                 say(f"  {error}")
-    return LabMeasures(**told)
+    return LabMeasures(**answers)
 
 
-def confirmed(said: str, answer: Callable[[str], str] = input) -> bool:
+def confirmed(message: str, answer: Callable[[str], str] = input) -> bool:
     """Whether a user wants this written; Enter alone does."""
-    say(said)
+    say(message)
     return answer("write this into params.yaml? [Y/n] ").strip().lower() in ("", "y", "yes")
 
 
 def set_up(
     measured: LabMeasures,
     path: Path | str = "params.yaml",
-    agreed: Callable[[str], bool] = lambda said: True,
+    agreed: Callable[[str], bool] = lambda message: True,
 ) -> dict:
     """Check what was measured and write it into `setup:`; comments and order stay.
 
@@ -176,7 +176,7 @@ def found(measured: LabMeasures, setup: SetupParams) -> tuple[dict[str, Any], li
         new["base_to_fork"] = _pose(camera @ seen)
     elif camera is not None and fork is None:
         raise UserError(
-            "--base-to-camera: setup.base_to_fork is null, so the camera cannot be told where the"
+            "--base-to-camera: setup.base_to_fork is null, so the camera does not know where the"
             " fork is: give --left-tip and --right-tip too, or --camera-to-fork"
         )
     if camera is not None and seen is not None and fork is not None:
@@ -227,11 +227,11 @@ def fork_of(left: np.ndarray, right: np.ndarray) -> Transform:
 def _agreed_width(apart: float, measured: LabMeasures, width: float) -> str:
     most = SURE * math.sqrt(2) * TOUCH
     if abs(apart - width) > most:
-        told = "--fork-width" if measured.fork_width is not None else "setup.fork_width"
+        answers = "--fork-width" if measured.fork_width is not None else "setup.fork_width"
         off = 1e3 * abs(apart - width)
         raise UserError(
-            f"the tips are {apart:.4f} m apart, {told} is {width:.4f} m: {off:.1f} mm differ, and"
-            f" touching explains {1e3 * most:.1f}: measure it with a ruler"
+            f"the tips are {apart:.4f} m apart, {answers} is {width:.4f} m: {off:.1f} mm differ,"
+            f" and touching explains {1e3 * most:.1f}: measure it with a ruler"
             " (--fork-width), and check the tool centre point"
         )
     return f"the tips are {apart:.4f} m apart, and fork_width is {width:.4f} m"

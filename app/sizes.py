@@ -6,7 +6,7 @@ from pipeline.base.errors import UserError
 from pipeline.params import Params
 from pipeline.params.lab import BandParams
 
-MASS, DIAMETER, REST_LENGTH = 0.03, 0.010, 0.52  # kg, m: of a common band, where nothing is told
+MASS, DIAMETER, REST_LENGTH = 0.03, 0.010, 0.52  # kg, m: of a common band, where nothing is given
 
 
 def band_to_come(

@@ -2,7 +2,7 @@
 
     python examples/own_optimizer.py
 
-The optimiser is asked for points of the unit cube and told their losses. The class has the form
+The optimiser is asked for points of the unit cube and gets their losses. The class has the form
 that params.yaml takes too: `search: my_module:Narrowing` under `methods` runs it in the pipeline.
 """
 
@@ -26,12 +26,12 @@ class Narrowing:
 
     def ask(self) -> np.ndarray:
         size = (self.population, len(self.best))
-        self.asked = np.clip(self.best + self.width * self.rng.normal(size=size), 0, 1)
-        return self.asked  # (N, D)
+        self.requested = np.clip(self.best + self.width * self.rng.normal(size=size), 0, 1)
+        return self.requested  # (N, D)
 
     def tell(self, losses: np.ndarray) -> None:
         if losses.min() < self.least:
-            self.best, self.least = self.asked[losses.argmin()], losses.min()
+            self.best, self.least = self.requested[losses.argmin()], losses.min()
         self.width *= self.shrink
 
 

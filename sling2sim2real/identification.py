@@ -129,8 +129,10 @@ class Identification(Model):
         except (NotMade, TypeError) as error:
             if not Path(path).is_file():
                 raise
-            said = getattr(error, "problem", error)
-            raise UserError(f"{path}: was not written by Identification.save ({said})") from error
+            message = getattr(error, "problem", error)
+            raise UserError(
+                f"{path}: was not written by Identification.save ({message})"
+            ) from error
 
     @classmethod
     def of_run(cls, band: str, method: str = METHOD, root: str | Path = ".") -> Identification:
@@ -146,7 +148,7 @@ class Identification(Model):
         content = load_theta(layout.theta(band, method), band)
         file = ThetaFile.model_validate(content)
         samples = load_samples(layout.confidence(band, method), parameters_of(content))
-        path, told = layout.clamps(band), content.get("confidence")
+        path, summary = layout.clamps(band), content.get("confidence")
         policy = Stored(band, method, layout.root)
         there = layout.episode(band).is_dir()
         episodes = Episode.load_all(layout.episodes(band)) if there else []
@@ -156,9 +158,9 @@ class Identification(Model):
             mounting=read_json(path, Mounting) if file.mounted and path.exists() else None,
             history=file.history and LaunchHistory(**file.history.model_dump()),
             settings=settings,
-            intervals=_intervals(content, told) if told else {},
+            intervals=_intervals(content, summary) if summary else {},
             samples=None if samples is None else samples.values,
-            settled=bool(told and told["settled"]),
+            settled=bool(summary and summary["settled"]),
             stretch=_stretch(episodes, settings, about),
             changed=tuple(map(str, changed_since(settings, content, method))),
             policy=policy if policy.folder.is_dir() else None,
@@ -198,7 +200,7 @@ def identify(
         launches: Measured, as evidence; at a draw (y, z), its error, the landing [m].
         settings: Boxes, budget, lab; None: `Settings.default()`.
         start: A model of the band to start from: without it, the first two steps.
-        progress: Is told a line at each step.
+        progress: Called with a line at each step.
 
     Raises:
         UserError: No episode; a recording that no simulation can follow.
@@ -239,7 +241,7 @@ def identify(
     ).density
     assert density is not None  # of a search by least squares there is one
     content = {"band": band.name, **posterior.theta_entries(density)}
-    told = posterior.confidence(density)
+    summary = posterior.confidence(density)
     file = ThetaFile.model_validate(content)
     return Identification(
         band=band,
@@ -247,9 +249,9 @@ def identify(
         mounting=mounting,
         history=file.history and LaunchHistory(**file.history.model_dump()),
         settings=settings,
-        intervals=_intervals(content, told),
+        intervals=_intervals(content, summary),
         samples=density.parameters.values,
-        settled=told["settled"],
+        settled=summary["settled"],
         stretch=_stretch(episodes, settings, band),
     )
 
@@ -270,13 +272,13 @@ def _evaluator(episode: Episode, sling: ClampedBand, settings: Settings) -> Eval
     return Evaluator(episode, sling, loss, box, devices=devices(), workers=workers())
 
 
-def _intervals(content: dict, told: dict) -> dict[str, Interval]:
+def _intervals(content: dict, summary: dict) -> dict[str, Interval]:
     """Of a θ file's content and its confidence."""
     found = {}
-    for name, one in told["parameters"].items():
+    for name, one in summary["parameters"].items():
         value, unit = content["theta"][name], SI_UNITS.get(name, "")
         found[name] = Interval(value, one["low"], one["high"], one["identifiable"], unit)
-    for name, one in told["derived"].items():
+    for name, one in summary["derived"].items():
         value, low, high = (float(one[key]) for key in ("value", "low", "high"))
         found[name] = Interval(value, low, high, True, one["unit"])
     return found

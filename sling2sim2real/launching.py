@@ -196,11 +196,11 @@ def _warnings(
     if interval is None:
         yield "no interval: too many launches beside the predicted one fail"
     sizes = model.settings.setup.fork_width, model.band.rest_length
-    asked = float(stretch_of(np.array([[0.0, *draw]]), *sizes)[0])
+    requested = float(stretch_of(np.array([[0.0, *draw]]), *sizes)[0])
     known = getattr(model, "stretch", None)
-    if known is not None and asked > known + ROUNDING:
+    if known is not None and requested > known + ROUNDING:
         yield (
-            f"the draw stretches the band by {100 * (asked - 1):.1f} %, its recordings by"
+            f"the draw stretches the band by {100 * (requested - 1):.1f} %, its recordings by"
             f" {100 * (known - 1):.1f} % at most: force and landing are extrapolated"
         )
     policy = getattr(model, "policy", None)

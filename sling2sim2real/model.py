@@ -238,10 +238,10 @@ class Model:
         return launch_many(self.sling, self.launch_setup, parameters, draws, workers=cores())
 
     def _history(self) -> LaunchHistory | None:
-        told = dict(vars(self.history)) if self.history else {}
-        told |= {name: value for name, value in self.settings.launch if value is not None}
-        complete = {"pull_time", "pause"} <= {*told}
-        return LaunchHistory(**told) if self.theta.law == RUBBER and complete else None
+        pull_history = dict(vars(self.history)) if self.history else {}
+        pull_history |= {name: value for name, value in self.settings.launch if value is not None}
+        complete = {"pull_time", "pause"} <= {*pull_history}
+        return LaunchHistory(**pull_history) if self.theta.law == RUBBER and complete else None
 
 
 def known(settings: Settings, band: Band) -> Settings:

@@ -23,8 +23,8 @@ def main() -> None:
     )
     explored = History.load(method, names, made(layout.history(band, method)))
     explored.best()  # says why, where all failed
-    regions, asked = regions_of(method_params, params.optimizer, explored)
-    save_regions(layout.clusters(band, method), names, regions, asked)
+    regions, requested = regions_of(method_params, params.optimizer, explored)
+    save_regions(layout.clusters(band, method), names, regions, requested)
     print(f"{band} {method}: {len(regions)} regions, best loss {regions[0].loss:.5g}")
 
 

@@ -68,11 +68,11 @@ def _cut_back(path: Path) -> None:
     if _is_valid(text):
         return
     begins = [one.start() for one in ENTRY.finditer(text)]
-    kept = text[: begins[-1]] if begins else ""
+    head = text[: begins[-1]] if begins else ""
     if len(begins) < 2:
         path.unlink()
-    elif _is_valid(kept):  # else it is damaged otherwise: the user's to mend, as DVC will say
-        write_text(path, kept)
+    elif _is_valid(head):  # else it is damaged otherwise: the user's to mend, as DVC will say
+        write_text(path, head)
 
 
 def _is_valid(text: str) -> bool:

@@ -16,7 +16,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder
 from pipeline.base.layout import Layout, NotMade
 from pipeline.recording.input.bag import once
-from pipeline.recording.kept import episodes_of, forget
+from pipeline.recording.stored import episodes_of, forget
 from stages.start import run, started
 
 

@@ -122,13 +122,13 @@ def remedy(error: NotMade) -> str:
 
 def stage_of(params: Params, step: str, band: str, method: str | None = None) -> str | None:
     """The stage of a step for a band, and a method; None where `run` lets them not meet."""
-    asked = params.run
+    requested = params.run
     item = band if method is None else f"{band}-{method}"
     for group, bands, methods in (
-        ("", asked.bands, asked.methods),
-        ("own_", asked.own, asked.methods[:1]),
-        ("dip_", asked.dips, asked.methods[:1]),
-        ("ablation_", asked.ablations.bands, asked.ablations.methods),
+        ("", requested.bands, requested.methods),
+        ("own_", requested.own, requested.methods[:1]),
+        ("dip_", requested.dips, requested.methods[:1]),
+        ("ablation_", requested.ablations.bands, requested.ablations.methods),
     ):
         if band in bands and method in (None, *methods):
             return f"{group}{step}@{item}"

@@ -21,7 +21,7 @@ OF_A_USER = {f"{ROOT}/params.yaml", f"{ROOT}/sling2sim2real/params.yaml"}
 
 
 def leave_the_users_file(event: str, about: tuple) -> None:
-    """The project may be in use: no test may hang on what somebody sets in its params.yaml."""
+    """The project may be in use: no test may depend on what somebody sets in its params.yaml."""
     if event == "open" and isinstance(about[0], str) and about[0].endswith("params.yaml"):
         assert os.path.abspath(about[0]) not in OF_A_USER, "tests take DEFAULTS of tests/project.py"
 

@@ -34,7 +34,7 @@ class Forked:
         )
 
     def __call__(self, *arguments: str) -> SimpleNamespace:
-        """Run it: `returncode`, negative for a signal, and `said`, all that it printed."""
+        """Run it: `returncode`, negative for a signal, and `message`, all that it printed."""
         print(json.dumps(arguments), file=self._process.stdin, flush=True)
         return SimpleNamespace(**json.loads(self._process.stdout.readline()))
 
@@ -47,9 +47,9 @@ class Forked:
         self._process.stdout.close()
 
 
-def _child(module, arguments: list[str], said: int) -> None:
+def _child(module, arguments: list[str], message: int) -> None:
     """In the forked process, which does not return."""
-    os.dup2(said, 1), os.dup2(said, 2)
+    os.dup2(message, 1), os.dup2(message, 2)
     sys.argv = [module.__file__, *arguments]
     status = 1
     try:
@@ -64,13 +64,13 @@ def _child(module, arguments: list[str], said: int) -> None:
 def main() -> None:
     module, *_ = map(importlib.import_module, sys.argv[1:])
     for line in sys.stdin:
-        with tempfile.TemporaryFile("w+") as said:
+        with tempfile.TemporaryFile("w+") as message:
             child = os.fork()
             if not child:
-                _child(module, json.loads(line), said.fileno())
+                _child(module, json.loads(line), message.fileno())
             status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-            said.seek(0)
-            print(json.dumps({"returncode": status, "said": said.read()}), flush=True)
+            message.seek(0)
+            print(json.dumps({"returncode": status, "said": message.read()}), flush=True)
 
 
 if __name__ == "__main__":

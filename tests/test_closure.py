@@ -187,7 +187,7 @@ def test_no_class_name_stands_twice() -> None:
 
 
 def test_a_folder_of_folders_holds_no_code() -> None:
-    """It is no dependency of a stage, so nothing may hang on it."""
+    """It is no dependency of a stage, so nothing may depend on it."""
     for name in ("pipeline/__init__.py", *(f"{folder}__init__.py" for folder in NESTED)):
         module = tree(ROOT / name)
         assert len(module.body) == 1 and ast.get_docstring(module), name

@@ -298,7 +298,7 @@ def test_what_commands_say_is_quoted_as_they_say_it() -> None:
     folders = [ROOT / place for place in places]
     files = sorted(file for folder in folders for file in folder.rglob("*.py"))
     code = "\n".join(file.read_text(encoding="utf-8") for file in files)
-    said = re.sub(r'"\s*\n\s*f?"', "", code)  # strings that go on in the next line
+    message = re.sub(r'"\s*\n\s*f?"', "", code)  # strings that go on in the next line
     page = (ROOT / "docs/faq.md").read_text(encoding="utf-8")
     tables = [page.split(f"| {head} | do |\n|---|---|\n")[1].split("\n\n")[0] for head in HEADS]
     rows = "\n".join(tables).splitlines()
@@ -306,4 +306,4 @@ def test_what_commands_say_is_quoted_as_they_say_it() -> None:
     assert len(quotes) > 20
     for quote in quotes:
         for piece in filter(None, (part.strip() for part in quote.split("..."))):
-            assert piece in said, f"no message says {piece!r}"
+            assert piece in message, f"no message says {piece!r}"

@@ -172,9 +172,9 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
 def test_the_python_of_the_readme_runs(project: Copy) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     code = text.split("```python\n")[1].split("```")[0].replace("band1_dip", "band1")
-    said = project("python", "-c", code).splitlines()
-    assert " Pa, 90 % interval " in said[0]
-    assert float(said[1]) > 0 and len(said[2].strip("()").split(",")) == 2
+    message = project("python", "-c", code).splitlines()
+    assert " Pa, 90 % interval " in message[0]
+    assert float(message[1]) > 0 and len(message[2].strip("()").split(",")) == 2
 
 
 def test_python_identifies_what_the_stage_does(project: Copy) -> None:

@@ -17,17 +17,17 @@ from tools.preset import KEPT, PRESETS, preset, timed, write_preset
 from validation.benchmarks.methods import LARGE
 
 RUN = ["sh", "-c", "test -e finish || exec sleep 60"]
-TOLD = "import sys; from pathlib import Path; from tools.preset import timed;"
+PRELUDE = "import sys; from pathlib import Path; from tools.preset import timed;"
 
 
 def seconds(folder: Path) -> float:
     """That are noted of the first stretch."""
-    kept = folder / KEPT
-    return json.loads(kept.read_text())["stretches"][0] if kept.is_file() else -1.0
+    retained = folder / KEPT
+    return json.loads(retained.read_text())["stretches"][0] if retained.is_file() else -1.0
 
 
 def test_stretches_add_up_over_a_kill_until_a_run_succeeds(tmp_path: Path) -> None:
-    code = f"{TOLD} timed({RUN}, Path({str(tmp_path)!r}), tick=0.05)"
+    code = f"{PRELUDE} timed({RUN}, Path({str(tmp_path)!r}), tick=0.05)"
     with subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, start_new_session=True) as first:
         try:
             until(lambda: first.poll() is None and seconds(tmp_path) >= 0.3)
@@ -94,11 +94,11 @@ def test_what_is_no_preset_or_spoils_params_is_refused_and_nothing_changes(tmp_p
         preset("huge")
     path, text = tmp_path / "params.yaml", DEFAULTS.read_text(encoding="utf-8")
     path.write_text(text, encoding="utf-8")
-    for wrong, told in (
+    for wrong, summary in (
         ({"optimizer": {"populatoin": 64}}, "optimizer.populatoin"),
         ({"optimizer": {"population": "many"}}, "optimizer.population"),
     ):
-        with pytest.raises(UserError, match=told):
+        with pytest.raises(UserError, match=summary):
             write_preset(path, wrong)
         assert path.read_text(encoding="utf-8") == text
 
@@ -111,7 +111,8 @@ def test_another_presets_stretches_do_not_count(tmp_path: Path) -> None:
 
 
 def test_a_termination_ends_the_run_as_well(tmp_path: Path) -> None:
-    code = f"import sys; {TOLD} sys.exit(timed({RUN}, Path({str(tmp_path)!r}), tick=0.05)[0] != 0)"
+    code = f"import sys; {PRELUDE}"
+    code += f" sys.exit(timed({RUN}, Path({str(tmp_path)!r}), tick=0.05)[0] != 0)"
     process = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, start_new_session=True)
     try:
         until(lambda: seconds(tmp_path) >= 0)

@@ -67,9 +67,9 @@ def timed(
 
     They are kept until it succeeds; another command, or another label, begins anew.
     """
-    kept, runs = root / KEPT, [label, *run]
+    record, runs = root / KEPT, [label, *run]
     try:
-        content = json.loads(kept.read_text(encoding="utf-8"))
+        content = json.loads(record.read_text(encoding="utf-8"))
         before = content["stretches"] if content["runs"] == runs else []
     except (OSError, ValueError, KeyError, TypeError):
         before = []
@@ -81,10 +81,10 @@ def timed(
             status = process.wait(tick)
         stretches = [*before, round(time.monotonic() - start, 1)]
         with suppress(UserError):  # a full disk, of which the flow itself will tell
-            write_json(kept, {"runs": runs, "stretches": stretches})
+            write_json(record, {"runs": runs, "stretches": stretches})
     signal.signal(signal.SIGTERM, earlier)
     if status == 0:
-        kept.unlink(missing_ok=True)
+        record.unlink(missing_ok=True)
     return status, stretches
 
 

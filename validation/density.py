@@ -81,7 +81,7 @@ def found(
     density = identified.density
     if density is None:
         best = identified.evaluations.best()
-        told = {"loss": {name: best[name] for name in (*TERMS, "total")}}
-        return Calibrated(sling, setup, identified.theta), told
-    told = posterior.confidence(density)
-    return Calibrated(sling, setup, density.mode, density.parameters, density.samples), told
+        description = {"loss": {name: best[name] for name in (*TERMS, "total")}}
+        return Calibrated(sling, setup, identified.theta), description
+    description = posterior.confidence(density)
+    return Calibrated(sling, setup, density.mode, density.parameters, density.samples), description

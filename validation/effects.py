@@ -98,7 +98,7 @@ def _cells(found: dict, switch: str, group: str) -> tuple[str, str, str]:
 
 def runs(figures: dict, rows: dict[str, str], methods: dict[str, str]) -> list[str]:
     """Sentences: how many identifications are behind a row, and how many found nothing."""
-    told = []
+    summary = []
     for method, name in methods.items():
         groups = [found for found in figures[method].values() if AS_IS in found]
         counts = {
@@ -107,12 +107,12 @@ def runs(figures: dict, rows: dict[str, str], methods: dict[str, str]) -> list[s
         }
         usual = counts[AS_IS]
         others = [f"{n} {rows[s]}" for s, n in counts.items() if n not in (0, usual)]
-        told.append(f"{name}: {usual} a row" + "".join(f", {other}" for other in others) + ".")
+        summary.append(f"{name}: {usual} a row" + "".join(f", {other}" for other in others) + ".")
         for switch, words in rows.items():
             failed = sum(found[switch]["failed"] for found in groups if switch in found)
             if failed:
-                told.append(f"{name}, {words}: {failed} of {counts[switch]} found no θ.")
-    return told
+                summary.append(f"{name}, {words}: {failed} of {counts[switch]} found no θ.")
+    return summary
 
 
 def _typeset(*cells: str) -> tuple[str, ...]:

@@ -116,7 +116,7 @@ def _figures(file: Path, root: Path, code: Path, state: str | None) -> Committed
     known = content.get("code") or {}
     if not known and isinstance(content.get("simulator"), str):
         known = {SIMULATOR: content["simulator"]}
-    changed = [part for part, kept in known.items() if digest(code / part) != kept]
+    changed = [part for part, retained in known.items() if digest(code / part) != retained]
     if not state and changed:
         state = OLDER
     elif not state:
@@ -147,8 +147,16 @@ def _by_commit(content: dict, code: Path) -> str:
         return UNKNOWN
     clean = commit.removesuffix("-dirty")
     try:
-        asked = ["git", "diff", "--quiet", "--end-of-options", clean, "--", *_parts(content, code)]
-        status = subprocess.run(asked, cwd=code, capture_output=True, check=False).returncode
+        requested = [
+            "git",
+            "diff",
+            "--quiet",
+            "--end-of-options",
+            clean,
+            "--",
+            *_parts(content, code),
+        ]
+        status = subprocess.run(requested, cwd=code, capture_output=True, check=False).returncode
     except OSError:
         return UNKNOWN
     same = TODAY if clean == commit else UNKNOWN

@@ -144,7 +144,7 @@ def ranked(params: Params, method: str, dips: Sequence[Dip], seed: Sequence[int]
     """
     rng = np.random.default_rng(seed)
     own = drawn(params, method, dips, rng)
-    outcome, told = found(params, method, own.sling, [own.episode])
+    outcome, confidence = found(params, method, own.sling, [own.episode])
     names, samples = own.coordinates.names, outcome.samples
     assert samples is not None and outcome.coordinates is not None
     draw = np.array([rng.uniform(*LAUNCHES[0]), rng.uniform(*LAUNCHES[1])])
@@ -160,6 +160,6 @@ def ranked(params: Params, method: str, dips: Sequence[Dip], seed: Sequence[int]
     return {
         "below": dict(zip(names, below, strict=True)) | {"landing": launch},
         "truth": dict(zip(names, own.phi, strict=True)),
-        "settled": told["settled"],
-        "pictures": told["recordings"][0]["pictures"],
+        "settled": confidence["settled"],
+        "pictures": confidence["recordings"][0]["pictures"],
     }

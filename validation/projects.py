@@ -157,14 +157,14 @@ class MarkedRun:
 
     def start(self, *command: str) -> subprocess.Popen:
         """In a session of its own; its lines, errors among them, go to `log`."""
-        with self.log.open("w") as said:
+        with self.log.open("w") as message:
             return subprocess.Popen(
                 command, cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
-                stdout=said, stderr=subprocess.STDOUT, start_new_session=True,
+                stdout=message, stderr=subprocess.STDOUT, start_new_session=True,
             )  # fmt: skip
 
     @property
-    def said(self) -> str:
+    def message(self) -> str:
         return self.log.read_text(errors="replace")
 
     def alive(self) -> list[psutil.Process]:
@@ -178,10 +178,10 @@ class MarkedRun:
         """Commands of what still lives after so long; what does is killed then."""
         wait(lambda: not self.alive(), seconds)
         left = self.alive()
-        said = [command_line(process) for process in left]
+        message = [command_line(process) for process in left]
         for process in left:
             send(process)
-        return said
+        return message
 
 
 def marked(name: str, value: str) -> list[psutil.Process]:

@@ -18,7 +18,7 @@ def part_below(samples: np.ndarray, truth: np.ndarray) -> np.ndarray:
     return (np.sum(samples < truth, axis=0) + 0.5) / (len(samples) + 1)
 
 
-def told(parts: np.ndarray) -> dict:
+def summary(parts: np.ndarray) -> dict:
     """What shares below (N,) of N episodes say.
 
     Returns:

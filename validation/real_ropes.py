@@ -44,16 +44,16 @@ def rms(gaps: np.ndarray, axis=None) -> np.ndarray:
     return 1e3 * np.sqrt((gaps**2).sum(2).mean(axis))
 
 
-def missed(run: np.ndarray, told: np.ndarray) -> dict:
+def missed(run: np.ndarray, summary: np.ndarray) -> dict:
     """How far markers (T, M, 3) [m] are from measured ones."""
-    gaps, second = inner(told) - inner(run), int(RATE)
+    gaps, second = inner(summary) - inner(run), int(RATE)
     return {
         "rms_mm": round(float(rms(gaps)), 1),
         "by_marker_mm": rms(gaps, 0).round(1).tolist(),
         "by_second_mm": [
             round(float(rms(gaps[i : i + second])), 1) for i in range(0, len(run), second)
         ],
-        "mean_coordinate_mm": round(float(1e3 * np.abs(told - run).mean()), 1),
+        "mean_coordinate_mm": round(float(1e3 * np.abs(summary - run).mean()), 1),
     }
 
 
@@ -66,14 +66,14 @@ def measured(first: np.ndarray, second: np.ndarray, size: SlingParams) -> tuple[
     """What one rope's report says, and the prediction of its second run."""
     chords = chords_of([first])
     values = fitted(first[:FITTED], chords, size)
-    again, told = (swing(run, chords, values, size) for run in (first, second))
+    again, summary = (swing(run, chords, values, size) for run in (first, second))
     return {
         "length_m": round(float(chords.sum()), 3),
         "values": {name: float(f"{values[name]:.3g}") for name in NAMES},
         "fitted_run": missed(first, again),
-        "predicted_run": missed(second, told),
+        "predicted_run": missed(second, summary),
         "first_shape_carried_along_rms_mm": round(float(rms(inner(carried(second) - second))), 1),
-    }, told
+    }, summary
 
 
 def finer(run: np.ndarray, rope: dict, size: SlingParams, chords: np.ndarray) -> float:
@@ -90,11 +90,11 @@ def main() -> None:
     runs = data.ropes(args.data)
     if not runs or any(len(two) < 2 for two in runs.values()):
         raise UserError(f"--data {args.data}: deform_dlo_mocap needs two runs of each rope")
-    size, ropes, told = load(DEFAULTS).sling, {}, {}
+    size, ropes, summary = load(DEFAULTS).sling, {}, {}
     with ProcessPoolExecutor(min(cores(), len(runs))) as pool:
         tasks = {name: pool.submit(measured, two[0], two[1], size) for name, two in runs.items()}
     for name, task in tasks.items():
-        ropes[name], told[name] = task.result()
+        ropes[name], summary[name] = task.result()
         print(f"{name}: {ropes[name]['predicted_run']['rms_mm']} mm rms", flush=True)
         if name in DEFORM:
             start, least = DEFORM[name]
@@ -111,7 +111,7 @@ def main() -> None:
         "finer": {one: finer(runs[one][1], ropes[one], size, chords_of(runs[one][:1]))},
         "ropes": ropes,
     }
-    figures.draw_ropes(FIGURES, {name: two[1] for name, two in runs.items()}, told, content)
+    figures.draw_ropes(FIGURES, {name: two[1] for name, two in runs.items()}, summary, content)
     command = "python -m validation.real_ropes --data ../shared/data/real"
     write_json(args.report, content | environment("cpu", command))
     print(f"wrote {args.report} and {FIGURES}/ropes.png")

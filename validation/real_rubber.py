@@ -87,9 +87,9 @@ def multiaxial(folder: Path) -> dict:
             small = values[(values[:, :3].max(1) <= 2.5) & (values[:, :3].min(1) >= 0.16)]
             if mode == "UT" or len(small) < 3:
                 continue
-            told = fit.values["shear_modulus"] * fits.biaxial(small, shape)
+            summary = fit.values["shear_modulus"] * fits.biaxial(small, shape)
             measured = small[:, 3:]
-            off = (told - measured)[np.isfinite(measured)]
+            off = (summary - measured)[np.isfinite(measured)]
             peak = np.nanmax(np.abs(measured))
             predicted[mode] = float(f"{100 * np.sqrt(np.mean(off**2)) / peak:.3g}")
         found[source] = {

@@ -133,13 +133,13 @@ class Cluster:
         self, on_line: Callable[[str], None], cancelled: Callable[[], bool]
     ) -> dict[str, dict]:
         """The workers, once there are some. Raises UserError, Cancelled."""
-        told = False
+        announced = False
         while not (workers := self._meet(on_line)):
             if cancelled():
                 raise child.Cancelled
-            if not told:
+            if not announced:
                 on_line(waits({}, "", {}))
-            told = True
+            announced = True
             time.sleep(0.5)
         return workers
 
@@ -193,7 +193,7 @@ class Cluster:
 
         from distributed import KilledWorker
 
-        with self._listening() as (topic, said):
+        with self._listening() as (topic, messages):
             future = self.client.submit(
                 work,
                 order,
@@ -202,10 +202,10 @@ class Cluster:
                 resources=resources,
                 pure=False,
             )
-            on, told, looked = "", "", time.monotonic()
+            on, announced, looked = "", "", time.monotonic()
             while True:
                 done = future.done()  # asked first: what was said before it is there by then
-                for kind, text in drained(said, 0.0 if done else 0.2):
+                for kind, text in drained(messages, 0.0 if done else 0.2):
                     on = text if kind == "on" else on
                     if kind != "end":
                         on_line(f"on {text}" if kind == "on" else text)
@@ -216,15 +216,15 @@ class Cluster:
                     if on:  # wait until its processes have ended
                         deadline = time.monotonic() + END
                         while time.monotonic() < deadline:
-                            if any(kind == "end" for kind, _ in drained(said, 0.2)):
+                            if any(kind == "end" for kind, _ in drained(messages, 0.2)):
                                 break
                     raise child.Cancelled
                 if time.monotonic() - looked > LOOK:
                     looked = time.monotonic()
                     tell = waits(self._workers(), on.split(" ")[0], resources)
-                    if tell and tell != told:
+                    if tell and tell != announced:
                         on_line(tell)
-                    told = tell
+                    announced = tell
             try:
                 return future.result()
             except KilledWorker as error:
@@ -238,10 +238,10 @@ class Cluster:
     @contextmanager
     def _listening(self) -> Iterator[tuple[str, queue.SimpleQueue]]:
         """A topic of Dask's for what one stage says, and the queue in which that arrives."""
-        topic, said = f"sling-{uuid.uuid4().hex}", queue.SimpleQueue()
-        self.client.subscribe_topic(topic, lambda event: said.put(event[1]))
+        topic, messages = f"sling-{uuid.uuid4().hex}", queue.SimpleQueue()
+        self.client.subscribe_topic(topic, lambda event: messages.put(event[1]))
         try:
-            yield topic, said
+            yield topic, messages
         finally:
             self.client.unsubscribe_topic(topic)
 
@@ -266,12 +266,12 @@ def connect(address: str):
         ) from error
 
 
-def drained(said: queue.SimpleQueue, patience: float) -> Iterator[tuple[str, str]]:
+def drained(messages: queue.SimpleQueue, patience: float) -> Iterator[tuple[str, str]]:
     """What is in a queue, waiting for the first [s]."""
     try:
-        yield tuple(said.get(timeout=patience) if patience else said.get_nowait())
+        yield tuple(messages.get(timeout=patience) if patience else messages.get_nowait())
         while True:
-            yield tuple(said.get_nowait())
+            yield tuple(messages.get_nowait())
     except queue.Empty:
         return
 

@@ -107,12 +107,12 @@ def transfer(
     if not stages:
         return
     force = ("--force",) if command == "pull" else ()
-    status, said = child.dvc(
+    status, output = child.dvc(
         root, (command, *force, *stages), environment=os.environ, cancelled=cancelled
     )
     if status:
         expect_room(root)  # `dvc pull` names the file alone
-        text = "\n".join(said)
+        text = "\n".join(output)
         why = one_line(text.partition("ERROR: ")[2] or text)
         raise UserError(
             f"{root}: dvc {command} {' '.join(stages)}: {why or f'exit status {status}'}"

@@ -54,9 +54,9 @@ def over_time(
             ends = [factor * found[number].values[name].value for number in numbers]
             ax.plot([places[number] for number in numbers], ends, color=NEW, lw=1, ls=":")
             middle = np.mean([places[number] for number in numbers]), np.mean(ends)
-            said = f"{100 * (change.ratio - 1):+.0f} %"
+            label = f"{100 * (change.ratio - 1):+.0f} %"
             about = {"xytext": (6, 6), "textcoords": "offset points", "color": NEW}
-            ax.annotate(said, middle, weight="bold", **about)
+            ax.annotate(label, middle, weight="bold", **about)
         ax.set_ylabel(QUANTITIES[name].heading)
         ax.margins(x=0.08, y=0.15)
     last = axes[-1]

@@ -31,7 +31,7 @@ class IdentifiedRecording(JsonRecord):
 
     Attributes:
         file: Its name.
-        key: Of all that the values hang on.
+        key: Of all that the values depend on.
         begin, end: Of its pulls' windows, by its own stamps [ns].
         pulls: That could be used.
         settled: Whether the fit has converged.
@@ -61,19 +61,19 @@ class KeptRecordings(JsonRecord):
 
 
 def identified(
-    files: Sequence[Path], band: Band, settings: Settings, code: dict[str, str], kept: Path
+    files: Sequence[Path], band: Band, settings: Settings, code: dict[str, str], retained: Path
 ) -> list[IdentifiedRecording]:
     """Each file identified alone, by its own mounting, exploration and nuisances.
 
     Args:
         code: Digests of the code that does it.
-        kept: JSON of an earlier call, from which what is the same is taken.
+        retained: JSON of an earlier call, from which what is the same is taken.
 
     Raises:
         UserError: A recording cannot be used.
     """
     try:
-        known = {one.key: one for one in read_json(kept, KeptRecordings).recordings}
+        known = {one.key: one for one in read_json(retained, KeptRecordings).recordings}
     except NotMade:
         known = {}
     about = json.dumps([vars(band), settings.model_dump(mode="json", include=set(USED)), code])

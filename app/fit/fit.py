@@ -69,11 +69,13 @@ def fit(
     root = Path(root)
     layout, params = Layout(root), load(root / "params.yaml")
     name = name or name_of(recordings)
-    told = [] if launches is None else evidence.read(launches)
+    observed = [] if launches is None else evidence.read(launches)
     recordings = once(recordings)
     file_of(layout.evidence, name, [*params.bands, name])
     expect_apart(layout, name)
-    evidence.joined(layout, name, told, "passed over")  # what is wrong is said before any change
+    evidence.joined(
+        layout, name, observed, "passed over"
+    )  # what is wrong is said before any change
     expect_ready(root)
     with corrected(root / "params.yaml", name, band) as params:
         if recordings:
@@ -81,8 +83,8 @@ def fit(
             say(brought_in(params, layout, recordings, name, band))
             params = load(root / "params.yaml")
         card_stage = running(params, name)
-    if told:
-        count = evidence.add(layout, name, told, "passed over")
+    if observed:
+        count = evidence.add(layout, name, observed, "passed over")
         say(f"{layout.evidence / name}.csv: {count} launches as evidence")
     read_evidence(layout.evidence, name, params)
     stages = leading_to(stages_of(root), card_stage)

@@ -76,7 +76,7 @@ def run_stage(
         StageFailed: With the stage's clear line.
         Cancelled: All its processes have ended.
     """
-    status, said = dvc(
+    status, output = dvc(
         root,
         ("repro", "-s", name),
         environment=environment,
@@ -84,8 +84,8 @@ def run_stage(
         cancelled=cancelled,
     )
     if status == 0:
-        return any(line == f"Running stage '{name}':" for line in said)
-    raise StageFailed(with_disk(f"{name}: {reason(name, said, status)}", root))
+        return any(line == f"Running stage '{name}':" for line in output)
+    raise StageFailed(with_disk(f"{name}: {reason(name, output, status)}", root))
 
 
 def repro(
@@ -127,7 +127,7 @@ def repro(
     dvc_files.mend(root)
     with RunLog(root, command, [stage]) as log:
         try:
-            status, said = dvc(
+            status, output = dvc(
                 root, ("repro", stage), environment=environment, on_line=line, on_stage=begins
             )
         except BaseException:
@@ -137,7 +137,7 @@ def repro(
         finally:
             dvc_files.mend(root)
         last = running[-1] if running else stage
-        failed = with_disk(f"{last}: {reason(last, said, status)}", root) if status else ""
+        failed = with_disk(f"{last}: {reason(last, output, status)}", root) if status else ""
         if running:
             log.ended(last, "failed" if failed else "ran", failed)
         if failed:
@@ -165,13 +165,13 @@ def dvc(
         Cancelled: All its processes have ended.
     """
     command = [sys.executable, "-P", dvc_process.__file__, "--wait-for-lock", *arguments]
-    said: list[str] = []
+    output: list[str] = []
     if cancelled():
         raise Cancelled
     with _guarded(command, root, environment, cancelled) as process:
         for line in process.stdout or ():
             line = line.rstrip("\n")
-            said.append(line)
+            output.append(line)
             ending = cancelled() or (process.poll() or 0) < 0  # what an interrupt makes it say
             if begun := BEGINS.fullmatch(line):
                 on_stage(begun[1])
@@ -179,7 +179,7 @@ def dvc(
                 on_line(line)
     if process.returncode and cancelled():
         raise Cancelled
-    return process.returncode, said
+    return process.returncode, output
 
 
 @contextmanager
@@ -228,12 +228,12 @@ def _is_own(line: str) -> bool:
     return bool(line) and not line.startswith(DVCS)
 
 
-def reason(name: str, said: list[str], status: int) -> str:
+def reason(name: str, output: list[str], status: int) -> str:
     """Why a stage failed: its own line of error, else what DVC says, else its last line."""
     if signal := _signal(status):  # whatever the stage said of that; DVC's comes by the guard
         return f"{'its guard' if status < 0 else 'DVC'} was killed by signal {signal}"
-    own = [line for line in said if _is_own(line)]
-    for line, following in zip(said, [*said[1:], ""], strict=True):
+    own = [line for line in output if _is_own(line)]
+    for line, following in zip(output, [*output[1:], ""], strict=True):
         why = line.removeprefix(f"ERROR: failed to reproduce '{name}': ")
         if why.startswith("failed to run: "):  # ..., exited with 1
             status = int(why.rpartition(" ")[2])

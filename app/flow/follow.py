@@ -199,13 +199,13 @@ class Log:
 
     async def _end(self, session: Any, event: dict) -> None:
         """Of a stage, or of the run with all that is still at work."""
-        told = *STATES[event["state"]], event["at"], event["message"]
+        payload = *STATES[event["state"]], event["at"], event["message"]
         for stage in [event["stage"]] if "stage" in event else self.open:
             task = self._task(stage)
-            await models.task_runs.set_task_run_state(session, task, _state(*told), force=True)
+            await models.task_runs.set_task_run_state(session, task, _state(*payload), force=True)
         if "stage" not in event:
             run = self._run
-            await models.flow_runs.set_flow_run_state(session, run, _state(*told), force=True)
+            await models.flow_runs.set_flow_run_state(session, run, _state(*payload), force=True)
 
     def _line(self, stage: str, text: str, at: float) -> actions.LogCreate:
         return actions.LogCreate(
@@ -228,13 +228,13 @@ class Log:
     ) -> None:
         """Make it, or change the one that there is."""
         one = uuid5(self._task(stage), f"{kind} {title}")
-        told = {"data": data, "description": words}
-        change = actions.ArtifactUpdate.model_validate(told)
+        payload = {"data": data, "description": words}
+        change = actions.ArtifactUpdate.model_validate(payload)
         if await models.artifacts.update_artifact(session, one, change):
             return
         of = {"flow_run_id": self._run, "task_run_id": self._task(stage)}
         new = core.Artifact.model_validate(
-            {"id": one, "key": key(title), "type": kind, **told, **of}
+            {"id": one, "key": key(title), "type": kind, **payload, **of}
         )
         await models.artifacts.create_artifact(session, new)
 

@@ -125,16 +125,16 @@ def outdated(root: Path, names: Iterable[str], code: tuple[str, ...]) -> dict[st
         graph = Graph(root)
     except UserError:
         return dict.fromkeys(names)
-    seen, told = Seen(), {}
+    seen, states = Seen(), {}
 
     def changed(name: str) -> bool:
-        if name not in told:
-            told[name] = any(
+        if name not in states:
+            states[name] = any(
                 isinstance(dep, ParamsDependency) or _inside(dep, root).startswith(code)
                 for dep in graph._dvc[name].deps
                 if not seen.same(dep)
             ) or any(map(changed, graph.stages[name].producers))
-        return told[name]
+        return states[name]
 
     with _clear():
         return {name: changed(name) if name in graph.stages else None for name in names}
@@ -145,7 +145,7 @@ def _inside(dep, root: Path) -> str:
 
 
 class Seen:
-    """What DVC found of files a moment ago: a hundred stages hang on the same code and parameters.
+    """What DVC found of files a moment ago: many stages depend on the same code and parameters.
 
     It only ever says that something is as it was; whether it is not is asked of DVC each time.
     """

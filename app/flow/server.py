@@ -61,12 +61,12 @@ def clean(root: Path) -> dict[str, str]:
 
     Without proxies: the server is here, and Prefect's client refuses to start by those of SOCKS.
     """
-    kept = {
+    options = {
         name: text
         for name, text in os.environ.items()
         if not name.startswith("PREFECT_") and not name.lower().endswith("_proxy")
     }
-    return kept | environment(root)
+    return options | environment(root)
 
 
 def address(root: Path) -> str | None:
@@ -100,7 +100,7 @@ def serve(root: Path, port: int | None = None) -> str:
     Args:
         port: Default 4200.
     """
-    if importlib.util.find_spec("prefect") is None:  # else its absence would be told in a log alone
+    if importlib.util.find_spec("prefect") is None:  # else only a log would say that it is absent
         raise ModuleNotFoundError(name="prefect")
     where = address(root)
     if where:
@@ -154,12 +154,12 @@ def _server(root: Path, port: int) -> Iterator[subprocess.Popen]:
     """Prefect's server on a free port, from when it answers to the end of the block, or ours."""
     start = ["-P", "-m", "prefect", "server", "start", "--host", HOST, "--port", str(port)]
     home(root).mkdir(parents=True, exist_ok=True)
-    with _log(root).open("w", encoding="utf-8") as said:
+    with _log(root).open("w", encoding="utf-8") as message:
         process = guard.start(
             [sys.executable, *start],
             env=clean(root) | {"PREFECT_UI_API_URL": f"{_url(port)}/api"},
-            stdout=said,
-            stderr=said,
+            stdout=message,
+            stderr=message,
         )
 
     def group() -> int:  # a server that just starts may be deaf

@@ -95,7 +95,7 @@ def designed_pull(
     way: Trajectory,
     longest: float,
     force: float | None,
-    told: Callable[[str], None] = lambda line: None,
+    progress: Callable[[str], None] = lambda line: None,
 ) -> DesignedPull:
     """Search dips for a band that `force` [N] holds at the draw; None: unknown.
 
@@ -103,7 +103,7 @@ def designed_pull(
         plan: With the draw, and the dips that are to be beaten.
         way: Without dips.
         longest: From the grasp to the release [s].
-        told: Of the search, a line now and then.
+        progress: Of the search, a line now and then.
 
     Raises:
         UserError: params.yaml has no method that could use them.
@@ -144,7 +144,7 @@ def designed_pull(
         nonlocal count
         count += 1
         if count % 5 == 1:
-            told(
+            progress(
                 f"pull {count}: {len(dips)} dips, ±{100 * HALF * variance**0.5:.2f} % of a landing"
             )
 

@@ -233,7 +233,7 @@ def plan_recording(
     precondition: int = 0,
     pulls: int = 1,
     root: str | Path = ".",
-    told: Callable[[str], None] = lambda line: None,
+    progress: Callable[[str], None] = lambda line: None,
 ) -> Plan:
     """Plan the recording of a band of params.yaml and check it against every limit.
 
@@ -249,7 +249,7 @@ def plan_recording(
         precondition: How often the band is stretched to the draw first, in the first grasp.
         pulls: How many in one recording; between two the hand returns and grasps again.
         root: Folder of the project.
-        told: Of a search, a line now and then.
+        progress: Of a search, a line now and then.
 
     Raises:
         UserError: in one line, where a limit is broken or something is not known.
@@ -289,7 +289,7 @@ def plan_recording(
         from app.plan.design import designed_pull  # the simulator, which takes a second
 
         design = designed_pull(
-            params, band, settings, trajectory, most_time, prediction.force, told
+            params, band, settings, trajectory, most_time, prediction.force, progress
         )
         dips = design.dips
         trajectory, (held_time, most_time) = through(dips)

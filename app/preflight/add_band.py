@@ -87,7 +87,7 @@ def add_band(
     else:
         files.copy(new)
     write_text(params_path, text)
-    return files.told(f"{name} added", reports)
+    return files.summary(f"{name} added", reports)
 
 
 def _with_band(path: Path, name: str, band: dict[str, object]) -> str:

@@ -63,7 +63,7 @@ def check(
             look.report.written.append(write_timeline(look, params, rrd))
     if pictures:
         with written(pictures):
-            said = write_pictures(look.pulls, pictures)
-        look.report.written.append(said)
+            message = write_pictures(look.pulls, pictures)
+        look.report.written.append(message)
     report = look.report
     return report.to_json(frames) if as_json else report.to_text(), int(not report.usable)

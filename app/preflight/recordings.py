@@ -14,7 +14,7 @@ from pipeline.base.errors import UserError, printable
 from pipeline.base.files import replacing, replacing_folder
 from pipeline.base.layout import Layout
 from pipeline.params import Params, expect_known, load
-from pipeline.recording import kept
+from pipeline.recording import stored
 from pipeline.recording.build import episode_of
 from pipeline.recording.input import bag
 from pipeline.recording.input.bag import sha256
@@ -49,7 +49,7 @@ def add_recording(
     expect_writable(layout.raw(band))
     reports = checked(recordings, params, band, layout)
     copy(files)
-    return told(f"{band}: added to the {len(there)} that were there", reports)
+    return summary(f"{band}: added to the {len(there)} that were there", reports)
 
 
 def targets(recordings: Sequence[Path], folder: Path) -> dict[Path, Path]:
@@ -91,7 +91,7 @@ def checked(
         if all(pull.usable for pull in look.report.pulls):
             made[file] = [episode_of(one, band, params) for one in look.pulls]
     for file, episodes in made.items():
-        kept.keep(file, episodes, params, layout)
+        stored.keep(file, episodes, params, layout)
     return reports
 
 
@@ -130,15 +130,15 @@ def _copy_masks(file: Path, target: Path, stack: ExitStack) -> None:
         raise UserError(f"{source}: cannot be copied ({error.strerror})") from error
 
 
-def told(done: str, reports: Sequence[CheckReport]) -> str:
+def summary(done: str, reports: Sequence[CheckReport]) -> str:
     """What was done, a line for each pull, and what costs accuracy in the first of each file."""
     lines = []
     for report in reports:
         for pull in report.pulls:
             name = printable(Path(report.path).name)
             name += f", pull {pull.number}" if len(report.pulls) > 1 else ""
-            said = f"peak force {pull.peak_force_n:.2f} N, release at {pull.release_s:.3f} s"
-            lines.append(f"  {name}: {said if pull.usable else f'left out, {pull.verdict}'}")
+            message = f"peak force {pull.peak_force_n:.2f} N, release at {pull.release_s:.3f} s"
+            lines.append(f"  {name}: {message if pull.usable else f'left out, {pull.verdict}'}")
         lines += [f"  - but {caution}" for caution in report.cautions]
     count = sum(pull.usable for report in reports for pull in report.pulls)
     pulls = "1 pull" if count == 1 else f"{count} pulls"

@@ -63,7 +63,7 @@ class Chosen(Topic):
 
 @dataclass(frozen=True)
 class PullLine:
-    """One pull of a file in a line; numbers are None where they could not be told.
+    """One pull of a file in a line; numbers are None where they could not be determined.
 
     Attributes:
         number: From 1 on, by time.
@@ -100,7 +100,7 @@ class CheckReport:
         signals, delays, cloud, phases, coverage: None and empty where the pull is not understood.
         motion: What the hand does with the drawn band, by time.
         keeps_prior: What that does not show, and so nothing but a prior tells, by what is missing.
-        extrinsics: None where it cannot be told.
+        extrinsics: None where it cannot be determined.
         cautions: What costs accuracy, and what to do.
         written: Files that were drawn of it, in words.
     """
@@ -129,9 +129,9 @@ class CheckReport:
     @property
     def row(self) -> PullLine:
         """This pull in a line."""
-        told, numbers = self.signals, (None, None, None)
-        if told:
-            numbers = told.grasp_s, told.release_s, told.peak_force_n
+        text, numbers = self.signals, (None, None, None)
+        if text:
+            numbers = text.grasp_s, text.release_s, text.peak_force_n
         return PullLine(self.pull, *numbers, self.usable, self.verdict, len(self.cautions))
 
     @property
@@ -169,17 +169,17 @@ class CheckReport:
 
     def _basis(self) -> list[str]:
         """The numbers that tell most, in words."""
-        lines, told, seen = [], self.signals, self.cloud
-        if told:
+        lines, text, seen = [], self.signals, self.cloud
+        if text:
             lines += [
-                f"  force: at most {told.peak_force_n:.1f} N, at {told.stretch:.2f} times the"
-                f" rest length; release known to ± {1e3 * told.release_error_s:.1f} ms"
+                f"  force: at most {text.peak_force_n:.1f} N, at {text.stretch:.2f} times the"
+                f" rest length; release known to ± {1e3 * text.release_error_s:.1f} ms"
             ]
         if self.motion:
             lines.append(f"  motion: {_motion(self.motion)}")
         if self.keeps_prior:
-            kept = (f"{keeps} ({what})" for what, keeps in self.keeps_prior.items())
-            lines.append(f"  not in it, so known by a prior alone: {'; '.join(kept)}")
+            retained = (f"{keeps} ({what})" for what, keeps in self.keeps_prior.items())
+            lines.append(f"  not in it, so known by a prior alone: {'; '.join(retained)}")
         if seen:
             shown = seen.frames - seen.empty
             covered = seen.taut_coverage
@@ -203,11 +203,11 @@ class CheckReport:
 
 def _motion(phases: list[MotionPhase]) -> str:
     """In the order of time; of many, the first and the last ones."""
-    told = list(map(str, phases))
-    if len(told) > MOST_PHASES:
-        left = len(told) - MOST_PHASES
-        told[MOST_PHASES - 3 : -3] = [f"{left} more"]
-    return ", ".join(told)
+    text = list(map(str, phases))
+    if len(text) > MOST_PHASES:
+        left = len(text) - MOST_PHASES
+        text[MOST_PHASES - 3 : -3] = [f"{left} more"]
+    return ", ".join(text)
 
 
 def _topics(topics: list[Topic]) -> list[str]:

@@ -160,7 +160,10 @@ class Arm:
         """Raises RuntimeError where a joint does not follow what it was told."""
         for _ in range(SETTLE):
             state = self.robot.state
-            off = [abs(float(q) - float(told)) for q, told in zip(state.q, state.q_d, strict=True)]
+            off = [
+                abs(float(q) - float(summary))
+                for q, summary in zip(state.q, state.q_d, strict=True)
+            ]
             if max(off) <= OFF:
                 return
             time.sleep(0.1)
@@ -203,27 +206,27 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--threshold", type=float, default=60.0, help="of a collision [N, Nm]")
     parser.add_argument("--no-realtime", action="store_true", help="on a kernel without PREEMPT_RT")
     parser.add_argument("--yes", action="store_true", help="do not ask")
-    told = parser.parse_args(arguments)
+    summary = parser.parse_args(arguments)
     try:
-        legs, start = legs_of(told.plan)
-        legs = aimed(legs, told.aim) if told.aim else legs
-        if told.half_turn:
+        legs, start = legs_of(summary.plan)
+        legs = aimed(legs, summary.aim) if summary.aim else legs
+        if summary.half_turn:
             start, *legs = map(half_turned, [start, *legs])
-        command = json.loads((told.plan / "gripper.json").read_text())[0]["command"]
+        command = json.loads((summary.plan / "gripper.json").read_text())[0]["command"]
     except (OSError, ValueError, KeyError, IndexError, StopIteration) as error:
-        said = f"{told.plan}: lacks {error}" if isinstance(error, KeyError) else error
-        print(f"error: {said}", file=sys.stderr)
+        message = f"{summary.plan}: lacks {error}" if isinstance(error, KeyError) else error
+        print(f"error: {message}", file=sys.stderr)
         return 1
     for leg in (start, *legs):
         place = " ".join(f"{value:+.4f}" for value in leg.position)
         print(f"{leg.name:<10}{leg.duration:7.3f} s   {place}   fingers {leg.opening:.3f} m")
-    if told.robot is None:
+    if summary.robot is None:
         return 0
-    if not told.yes and input("a hand at the stop, nobody near? [yes] ").strip() != "yes":
+    if not summary.yes and input("a hand at the stop, nobody near? [yes] ").strip() != "yes":
         return 1
     try:
-        arm = Arm(told.robot, told.threshold, not told.no_realtime)
-        arm.begin(start, told.half_turn)
+        arm = Arm(summary.robot, summary.threshold, not summary.no_realtime)
+        arm.begin(start, summary.half_turn)
         opening = start.opening
         for leg in legs:
             arm.go(leg, opening, command["max_effort"])

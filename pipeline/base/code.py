@@ -1,4 +1,4 @@
-"""What code a result hangs on: the folders that a script imports, and a digest of each.
+"""What code a result depends on: the folders that a script imports, and a digest of each.
 
 Python's imports are followed at any depth and inside functions too. `tools/closure.py` writes them
 into dvc.yaml; environment.py notes them with every figure, and

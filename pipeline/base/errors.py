@@ -16,9 +16,9 @@ class UserError(Exception):
     """Bad input. The message says what is wrong, where, and how to mend it, in one line."""
 
 
-def one_line(said: object) -> str:
+def one_line(message: object) -> str:
     """What somebody else said, such as a library's error, as one line."""
-    return printable(" ".join(str(said).split()))
+    return printable(" ".join(str(message).split()))
 
 
 def printable(text: str) -> str:

@@ -62,8 +62,8 @@ def _temporary(path: Path) -> Iterator[Path]:
         _remove_abandoned(path)
         yield temporary
     except OSError as error:
-        said = OSError(error.errno, error.strerror, str(path))  # not by its temporary name
-        if not (line := refused(said)):
+        message = OSError(error.errno, error.strerror, str(path))  # not by its temporary name
+        if not (line := refused(message)):
             raise
         raise UserError(line) from error
     finally:

@@ -1,4 +1,4 @@
-"""A hash of what a result hangs on, by which what is kept of it is known to be still valid."""
+"""A hash of what a result depends on, by which what is kept of it is known to be still valid."""
 
 from __future__ import annotations
 

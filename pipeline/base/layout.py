@@ -1,6 +1,6 @@
 """Where files lie under data/, and the error of one that is not there, or not whole.
 
-No other module of pipeline/ spells these paths. What makes a file is told where errors are printed
+No other module of pipeline/ spells these paths. What makes a file is said where errors are printed
 (stages/start.py), by its place alone.
 """
 

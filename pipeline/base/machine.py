@@ -26,7 +26,7 @@ def devices() -> tuple[str, ...]:
 
 
 def kind() -> str:
-    """cpu or cuda: what results hang on of SLING_DEVICE. Raises UserError."""
+    """cpu or cuda: what results depend on of SLING_DEVICE. Raises UserError."""
     return devices()[0].partition(":")[0]
 
 
@@ -79,8 +79,8 @@ def cores() -> int:
     SLING_WORKERS; else the cores that this process may run on, as far as its container's limit of
     CPU time allows.
     """
-    if said := workers():
-        return said
+    if message := workers():
+        return message
     ours = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     try:
         time, period = map(int, LIMIT.read_text().split())  # "max 100000" where there is none

@@ -31,23 +31,23 @@ DRIVERS = "libcuda.so", "libcuda.so.1"  # as Warp looks for them
 def start() -> None:
     """Start Warp, without its warning on a machine that has no CUDA driver.
 
-    Whoever asks for a GPU there is told by `machine.named`. The warning is a line of native code.
+    `machine.named` refuses a GPU there. The warning is a line of native code.
     """
     home.settle()
     if any(map(_loads, DRIVERS)):
         wp.init()
         return
     sys.stderr.flush()
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as message:
         stderr = os.dup(2)
-        os.dup2(said.fileno(), 2)
+        os.dup2(message.fileno(), 2)
         try:
             wp.init()
         finally:
             os.dup2(stderr, 2)
             os.close(stderr)
-            said.seek(0)
-            for line in said:
+            message.seek(0)
+            for line in message:
                 if not line.startswith(b"Warp CUDA warning: Could not find or load"):
                     os.write(2, line)
 

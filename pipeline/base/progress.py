@@ -67,7 +67,7 @@ class Progress:
         Args:
             title: Without blanks.
             log: Default logs/<title>.log; an earlier run's lines stay in it.
-            every: Least time between two lines [s]; the last one is always told.
+            every: Least time between two lines [s]; the last one is always reported.
         """
         self.title, self.total, self.unit, self.every = title, total, unit, every
         self.log = log or Path("logs", f"{title}.log")

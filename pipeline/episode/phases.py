@@ -211,7 +211,7 @@ def unseen(found: Sequence[InteractionPhase]) -> dict[str, str]:
         for shown, what, keeps in (
             (back, NO_UNLOADING, "softening and hysteresis, so the energy that a launch gets back"),
             (pauses, f"no pause of {PAUSE:g} s", "slow relaxation"),
-            (speeds, "one speed alone", "how the force hangs on speed"),
+            (speeds, "one speed alone", "how the force depends on speed"),
         )
         if not shown
     }

@@ -117,8 +117,8 @@ def recording_matrix(
             row.start if g.start else 0, min(row.stop, samples) if g.stop < len(grid) else samples
         )
         pulses = _at(grid[g], t, np.eye(len(t), last - first, -first))
-        felt = lowpass(pulses, SIMULATED_RATE, cutoff)
-        matrix[row, first:last] = _means(grid[g], felt, edges[row.start : row.stop + 1], period)
+        filtered = lowpass(pulses, SIMULATED_RATE, cutoff)
+        matrix[row, first:last] = _means(grid[g], filtered, edges[row.start : row.stop + 1], period)
     return matrix
 
 

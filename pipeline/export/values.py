@@ -56,8 +56,11 @@ def sizes(model: CalibratedBand) -> dict[str, float | list[float] | None]:
 
 def history(model: CalibratedBand) -> dict[str, float] | None:
     """In how long the hand must draw, and how long it must wait; None: it does not matter."""
-    told = model.launch_setup.history
-    return told and {"pull_time_s": rounded(told.pull_time, 6), "pause_s": rounded(told.pause, 6)}
+    pull_history = model.launch_setup.history
+    return pull_history and {
+        "pull_time_s": rounded(pull_history.pull_time, 6),
+        "pause_s": rounded(pull_history.pause, 6),
+    }
 
 
 def without_slot(model: CalibratedBand) -> list[dict]:
@@ -106,10 +109,11 @@ def without_slot(model: CalibratedBand) -> list[dict]:
 
 
 def _of_rubber(model: CalibratedBand) -> list[tuple[str, str, str]]:
-    theta, told = model.parameters.sample(), history(model)
+    theta, pull_history = model.parameters.sample(), history(model)
     after = "it has forgotten every pull"
-    if told:
-        after = f"a pull of {told['pull_time_s']:.1f} s and a pause of {told['pause_s']:.1f} s"
+    if pull_history:
+        after = f"a pull of {pull_history['pull_time_s']:.1f} s and a pause of"
+        after += f" {pull_history['pause_s']:.1f} s"
     return [
         (
             "relaxation",

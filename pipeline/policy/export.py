@@ -108,17 +108,17 @@ def write_onnx(policy: Policy, path: Path) -> None:
 
 def write_torchscript(policy: Policy, path: Path) -> None:
     """Write the policy as TorchScript, less its debug records, which hold this machine's paths."""
-    saved, kept = io.BytesIO(), io.BytesIO()
+    saved, retained = io.BytesIO(), io.BytesIO()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # torch would rather have torch.export
         # Frozen: a plain script lists attributes in the order of a set, which changes by run.
         torch.jit.save(torch.jit.freeze(torch.jit.script(policy.eval())), saved)
-    with zipfile.ZipFile(saved) as source, zipfile.ZipFile(kept, "w") as target:
+    with zipfile.ZipFile(saved) as source, zipfile.ZipFile(retained, "w") as target:
         for entry in source.infolist():
             if not entry.filename.endswith((".debug_pkl", "/serialization_id")):
                 target.writestr(zipfile.ZipInfo(entry.filename), source.read(entry))
     with replacing(path) as temporary:
-        temporary.write_bytes(kept.getvalue())
+        temporary.write_bytes(retained.getvalue())
 
 
 def card(

@@ -1,4 +1,4 @@
-"""What rsl_rl is told of PPO and its networks."""
+"""Settings of rsl_rl for PPO and its networks."""
 
 from __future__ import annotations
 

@@ -126,7 +126,7 @@ def train(
 
     Args:
         surface: Says where draws land: read off a map, or simulated.
-        progress: Is told of each iteration.
+        progress: Called for each iteration.
         projectile: Where it starts (y, z) [m], for a policy that sees it.
 
     Runs on one thread with seeded generators: the same input gives the same network, bit for bit,
@@ -162,7 +162,7 @@ def earned(
     return float(rewards.mean()), mean, int(failed.sum())
 
 
-def told(error: float) -> str:
+def summary(error: float) -> str:
     """A mean error [m], NaN where every launch fails, as progress tells of it."""
     return "every launch fails" if np.isnan(error) else f"mean error {100 * error:.2f} cm"
 
@@ -234,7 +234,7 @@ class _Training:
             weights = copy.deepcopy(self.policy.state_dict())
             self.best = {"earned": worth, "row": it, "weights": weights}
         if self.progress:
-            self.progress.advance(1, told(error))
+            self.progress.advance(1, summary(error))
 
     def _check(self) -> tuple[float, float, int]:
         draws = self.policy.draws(self.checked)

@@ -45,17 +45,17 @@ def why_no_band(view: View) -> str:
             f"the depth camera's principal point is at {at} of {whole} pixels: its camera_info is"
             " of another resolution"
         )
-    said, swapped = (_factor(view, other) for other in (False, True))
-    if said == 1.0 or (said is None and swapped is None):
+    stated_factor, swapped = (_factor(view, other) for other in (False, True))
+    if stated_factor == 1.0 or (stated_factor is None and swapped is None):
         return ""
     reasons = []
-    if said is None or swapped == 1.0:
+    if stated_factor is None or swapped == 1.0:
         flag = int(view.recording.depth.values[0].is_bigendian)
         reasons.append(f"is_bigendian is {flag}, but the depth's bytes are the other way round")
-        said = swapped
-    if said is not None and said != 1.0:
-        unit = f", as of unit {UNITS[said]}" if said in UNITS else ""
-        reasons.append(f"the depth is {said:g} times what it must be at the hand{unit}")
+        stated_factor = swapped
+    if stated_factor is not None and stated_factor != 1.0:
+        unit = f", as of unit {UNITS[stated_factor]}" if stated_factor in UNITS else ""
+        reasons.append(f"the depth is {stated_factor:g} times what it must be at the hand{unit}")
     return f"{', and '.join(reasons)}: {CURE}"
 
 

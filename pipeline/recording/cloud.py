@@ -29,7 +29,7 @@ class Clouds:
         time: Stamps, seconds since the window's start, shape (K,).
         points: Frame O, K arrays of shape (<= points, 3), float32; some may be empty.
         pixels: Masked pixels of each frame before outliers were removed, shape (K,).
-        color_counts: Whether the band's colour told it from the arm's.
+        color_counts: Whether the band's colour differs from the arm's.
         damaged, damaged_colors: Frames of the window that could not be decoded, and those of them
             whose depth could.
         unpaired: Depth frames of the window without a colour frame.

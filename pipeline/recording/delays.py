@@ -98,7 +98,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Delays:
-    """Of pose (and twist) and of the camera's two topics; and the tool that told the pose's.
+    """Of pose (and twist) and of the camera's two topics; and the tool that showed the pose's.
 
     Attributes:
         tool_inertia: Its `delay` is what `pose` leaves of it, 0 where no more than its error.

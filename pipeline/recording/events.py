@@ -123,7 +123,7 @@ def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = Non
     if resolution > GAP * period:
         raise UserError(
             f"force is missing for {1e3 * resolution:.0f} ms around the release at"
-            f" {t[first]:.3f} s: its time cannot be told, record again"
+            f" {t[first]:.3f} s: its time cannot be determined, record again"
         )
     fall = (level - along) / drop
     time, error, lasted = _onset(t, fall, first, max(noise / drop, 0.003), period)
@@ -340,7 +340,7 @@ def _closed(t: np.ndarray, opening: np.ndarray, release: float) -> float | None:
 
 
 def _moved(opening: np.ndarray) -> bool:
-    """Whether fingers moved, in whatever unit they are told."""
+    """Whether fingers moved, in whatever unit."""
     jitter = 1.4826 * float(np.median(np.abs(np.diff(opening)))) if len(opening) > 1 else 0.0
     return float(np.ptp(opening)) >= max(LEAST_STROKE, 2 * SIGMAS * jitter)
 

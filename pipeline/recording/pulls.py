@@ -120,8 +120,8 @@ class Pull:
         the camera's tells neither.
         """
         moved = replace(self, recording=self.recording.shifted(pose, camera))
-        kept = UNMOVED if pose else (*UNMOVED, "motion", "grasp")
-        vars(moved).update({name: vars(self)[name] for name in kept if name in vars(self)})
+        retained = UNMOVED if pose else (*UNMOVED, "motion", "grasp")
+        vars(moved).update({name: vars(self)[name] for name in retained if name in vars(self)})
         return moved
 
 

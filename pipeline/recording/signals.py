@@ -271,6 +271,6 @@ def _twist_difference(pull: Pull, times: np.ndarray, velocity: np.ndarray) -> fl
     twist = pull.recording.twist
     if twist is None or twist.topic == pull.recording.pose.topic:
         return None
-    said = np.linalg.norm(twist.values[:, :3], axis=1)
+    reported = np.linalg.norm(twist.values[:, :3], axis=1)
     speed = np.interp(twist.seconds(pull.recording.origin), times, np.linalg.norm(velocity, axis=1))
-    return float(np.median(np.abs(said - speed)))
+    return float(np.median(np.abs(reported - speed)))

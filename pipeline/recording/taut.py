@@ -87,12 +87,14 @@ def samples_of(
         side = np.argmin(aside, axis=1)
         point = np.arange(len(cloud))
         clear = (along[point, side] > CLEAR[0]) & (along[point, side] < lengths[side] - CLEAR[1])
-        kept = clear & (aside[point, side] < WITHIN * scene.diameter)
-        if tension <= 0 or min(np.sum(kept & (side == s)) for s in (0, 1)) < LEAST_POINTS:
+        retained = clear & (aside[point, side] < WITHIN * scene.diameter)
+        if tension <= 0 or min(np.sum(retained & (side == s)) for s in (0, 1)) < LEAST_POINTS:
             continue
-        kept = np.flatnonzero(kept)[:: max(1, int(kept.sum()) // MOST_POINTS)]
+        retained = np.flatnonzero(retained)[:: max(1, int(retained.sum()) // MOST_POINTS)]
         radius = scene.diameter / 2 / np.sqrt(scene.stretch(time))  # rubber keeps its volume
-        parts.append((cloud[kept].astype(float), scene.tips[side[kept]], hand, tension, radius))
+        parts.append(
+            (cloud[retained].astype(float), scene.tips[side[retained]], hand, tension, radius)
+        )
         stretches.append(scene.stretch(time))
     if len(parts) < LEAST_FRAMES:
         return None
@@ -207,9 +209,9 @@ def _hanging(
     before = [cloud for time, cloud in zip(times, clouds, strict=True) if time < free]
     points = np.concatenate([np.zeros((0, 3)), *before])
     half, low = scene.tips[1, 0], scene.tips[1, 2] - 0.5 * scene.rest_length - 0.02
-    kept = (np.abs(points[:, 0]) < half) & (np.abs(points[:, 1]) < 3.5 * scene.diameter)
-    kept &= (points[:, 2] < scene.tips[1, 2] - CLEAR[0]) & (points[:, 2] > low)
-    points = points[kept].astype(float)
+    retained = (np.abs(points[:, 0]) < half) & (np.abs(points[:, 1]) < 3.5 * scene.diameter)
+    retained &= (points[:, 2] < scene.tips[1, 2] - CLEAR[0]) & (points[:, 2] > low)
+    points = points[retained].astype(float)
     # A catenary's slope grows in proportion to the arc from its lowest point.
     depth = 0.9 * np.sqrt(max((scene.rest_length / 2) ** 2 - half**2, 0)) / half**2
     way = np.stack([np.ones(len(points)), 0 * points[:, 0], 2 * depth * points[:, 0]], axis=1)

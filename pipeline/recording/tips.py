@@ -1,4 +1,4 @@
-"""How far the extrinsics are off, told from the drawn band, which is two straight lines.
+"""How far the extrinsics are off, from the drawn band, which is two straight lines.
 
 Each line runs from a fork tip to the hand. A camera that is misplaced moves and turns all of them
 alike; a hand that is misplaced moves their common end and leaves the tips. At different draws the

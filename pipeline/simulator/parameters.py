@@ -93,8 +93,8 @@ class Parameters:
 
     def changed(self, **columns: float | np.ndarray) -> Parameters:
         """The same with other columns, one or one a sample; of one sample, as many as they have."""
-        kept = dict(zip(self.names, self.values.T, strict=True))
-        return Parameters.named(self.law, kept | columns)
+        retained = dict(zip(self.names, self.values.T, strict=True))
+        return Parameters.named(self.law, retained | columns)
 
     def spread(self, count: int) -> Parameters:
         """`count` samples: these, or this one so many times."""

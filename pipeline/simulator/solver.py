@@ -174,14 +174,14 @@ def _widths(
     sling: ClampedBand, schedule: Schedule, frames: Frames, options: Options
 ) -> dict[str, int]:
     """Numbers that each array which a kernel writes holds of one sling."""
-    kept = (2 * sling.dofs + 2) * sling.sections * (sling.dofs + 1)
+    stored = (2 * sling.dofs + 2) * sling.sections * (sling.dofs + 1)
     if options.on_gpu:  # by two chains, and for spare threads
-        kept = (2 * sling.dofs + 1) * (sling.middle + 1) * WARP
+        stored = (2 * sling.dofs + 1) * (sling.middle + 1) * WARP
     return {
         "state": sling.dofs * sling.sections,
         "lanes": width(LANE),
         "scratch": (9 * sling.dofs + memories(sling.law) + 4) * sling.sections,
-        "work": kept,
+        "work": stored,
         "output": 0 if options.launching else width(OUTPUT) * len(schedule.steps),
         "frames": len(frames.steps) * sling.sections * frames.width,
     }

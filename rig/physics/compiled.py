@@ -22,11 +22,11 @@ HERE = Path(__file__).parent
 
 def _folders() -> list[Path]:
     """Where compiled code may lie, best first."""
-    asked = os.environ.get("NUMBA_CACHE_DIR")
+    requested = os.environ.get("NUMBA_CACHE_DIR")
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     shared = Path(tempfile.gettempdir()) / f"sling2sim2real-{os.getuid()}"
-    kept = [HERE / "__pycache__", Path(cache) / "sling2sim2real", shared]
-    return [Path(asked), *kept] if asked else kept
+    folders = [HERE / "__pycache__", Path(cache) / "sling2sim2real", shared]
+    return [Path(requested), *folders] if requested else folders
 
 
 def _is_ours(folder: Path) -> bool:

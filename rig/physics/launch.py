@@ -77,10 +77,10 @@ def launch_from(
     taut = string.length / 2
     if np.linalg.norm(aim - string.clamps[0]) <= taut:
         return Trial(float("nan"), SLACK, 0.0)
-    asked = params.launch
-    *_, relaxed, memory = pulled(string, aim, asked.pull_time, asked.pause, again=True)
-    give, kept = 1 / params.rig.arm.stiffness, memory[-1] / relaxed[-1]
-    y = string.at_rest(bent_at(string, aim), tolerance, held=True, give=give, memory=kept)
+    requested = params.launch
+    *_, relaxed, memory = pulled(string, aim, requested.pull_time, requested.pause, again=True)
+    give, memory_ratios = 1 / params.rig.arm.stiffness, memory[-1] / relaxed[-1]
+    y = string.at_rest(bent_at(string, aim), tolerance, held=True, give=give, memory=memory_ratios)
     hold_force = float(np.linalg.norm(string.at_middle(y)))
     limit = params.setup.max_force
     if hold_force > limit:

@@ -31,11 +31,11 @@ class Elimination:
         self.factors = np.empty((3 * nodes, 2 * REACH + 1))
         self.gamma = 0.0
 
-    def setup(self, time, y, rates, kept, new, gamma, data) -> None:
-        """Factorise for this gamma; `kept`: with the Jacobian of before."""
-        if not kept:
+    def setup(self, time, y, rates, reuse, new, gamma, data) -> None:
+        """Factorise for this gamma; `reuse`: with the Jacobian of before."""
+        if not reuse:
             slopes(time, y, self.jacobian, data)
-        new[0], self.gamma = not kept, gamma
+        new[0], self.gamma = not reuse, gamma
         _factorised(self.jacobian, gamma, self.memories, self.factors)
 
     def solve(self, time, y, rates, r, z, gamma, delta, side, data) -> None:
@@ -45,7 +45,7 @@ class Elimination:
 
 @compiled
 def _forgotten(jacobian: np.ndarray, e: int, gamma: float, w: np.ndarray) -> None:
-    """Solve for the memories of edge e in place: each hangs on itself and on later ones alone."""
+    """Solve for the memories of edge e in place: each depends on itself and on later ones alone."""
     size = len(w)
     for k in range(size - 1, -1, -1):
         for other in range(k + 1, size):
@@ -79,8 +79,8 @@ def _factorised(
                     value = gamma * block[3 + a, c] + block[3 + a, 3 + c]
                     for e in range(max(i - 1, j - 1), min(i, j) + 1):
                         for k in range(width - 6):
-                            felt = jacobian[i, e - i + NEAR, 3 + a, 6 + k]
-                            value += gamma * felt * memories[e, j - e, k, c]
+                            entry = jacobian[i, e - i + NEAR, 3 + a, 6 + k]
+                            value += gamma * entry * memories[e, j - e, k, c]
                     factors[3 * i + a, REACH + 3 * (j - i) + c - a] -= gamma * value
     for p in range(3 * nodes):
         for q in range(p + 1, min(p + REACH + 1, 3 * nodes)):

@@ -186,7 +186,7 @@ def pull_history(
 ) -> np.ndarray:
     """Drawn distance, 0 to 1, every `step` seconds from the start of the pull to the release.
 
-    Without dips: a rubber does not hang on how it is recorded.
+    Without dips: a rubber does not depend on how it is recorded.
 
     Args:
         pull_time, pause: Of the hand [s]; None: as it records a band.

@@ -120,7 +120,7 @@ class Softening:
 
 
 @compiled
-def kept(energy: float, worst: float, modulus: float, softening: np.ndarray) -> float:
+def softened(energy: float, worst: float, modulus: float, softening: np.ndarray) -> float:
     """h of an energy and the largest so far [MJ/m3]; `softening` as in `Softening`."""
     if softening[4]:
         least = max(min(energy, worst), 0.0)  # at rest, rounding can make an energy negative
@@ -154,7 +154,7 @@ def respond(
     energy, stress, slope = elasticity.at(material.law, stretch, material.constants)
     if len(material.softening):
         worst = memory[i, -1]
-        part = kept(energy, worst, material.modulus, material.softening)
+        part = softened(energy, worst, material.modulus, material.softening)
         stress, slope = part * stress, part * slope
         rates[i, -1] = max(energy - worst, 0.0) / material.softening[3]
     total = stress
@@ -254,7 +254,9 @@ class Rubber:
     def _kept(self, energy: np.ndarray, worst: np.ndarray) -> np.ndarray:
         """h of energies and the largest so far (N,)."""
         numbers, modulus = self.material.softening, self.law.modulus
-        return np.array([kept(e, w, modulus, numbers) for e, w in zip(energy, worst, strict=True)])
+        return np.array(
+            [softened(e, w, modulus, numbers) for e, w in zip(energy, worst, strict=True)]
+        )
 
     def remembering(self, stretch: np.ndarray, ratios: np.ndarray) -> np.ndarray:
         """Memories (N, M) at stretches (N,).

@@ -226,12 +226,12 @@ class ElasticString:
             give: By how much what holds the middle gives way to the band's force [m/N].
             memory: Ratios (M,) of every edge, see `Rubber.remembering`; None: all is relaxed.
         """
-        frozen, kept = self.rubber.frozen(memory)
+        frozen, memory_ratios = self.rubber.frozen(memory)
         sticky = replace(self, rubber=frozen, damping=2 * np.sqrt(-GRAVITY[2] / (self.length / 2)))
-        if held and (nodes := sticky.balanced(x, kept, tolerance / 100, give)) is not None:
+        if held and (nodes := sticky.balanced(x, memory_ratios, tolerance / 100, give)) is not None:
             return self.state(nodes, memory)
         times, hand = np.array([0, 0.5, 1]) * SETTLING_TIME, STILL if held else ABSENT
-        end = sticky.integrate(sticky.state(x, kept), times, tolerance, hand=hand)[1][-1]
+        end = sticky.integrate(sticky.state(x, memory_ratios), times, tolerance, hand=hand)[1][-1]
         return self.state(end[:, :3], memory)
 
     def balanced(

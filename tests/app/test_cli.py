@@ -51,8 +51,8 @@ def test_each_example_is_understood_and_stands_in_the_help(name: str, example: s
 def test_the_help_documents_each_exit_status(capsys) -> None:
     with pytest.raises(SystemExit):
         cli.parser().parse_args(["--help"])
-    said = capsys.readouterr().out.partition("exit status:")[2]
-    assert [int(line.split()[0]) for line in said.splitlines() if line.strip()] == [*EXITS]
+    message = capsys.readouterr().out.partition("exit status:")[2]
+    assert [int(line.split()[0]) for line in message.splitlines() if line.strip()] == [*EXITS]
 
 
 def test_the_documented_commands_are_understood() -> None:
@@ -77,12 +77,12 @@ def test_the_documented_commands_are_understood() -> None:
     assert not aimed.force and parse("aim --band b --target 2 --force".split()).force
     assert parse("aim --band band1 --method m --target 1.925".split()).method == "m"
     assert parse("bench --device cuda:0 --json".split()).device == "cuda:0"
-    assert bench.asked(parse("bench --law rubber --json".split())) == ""
-    assert bench.asked(parse("bench --scaling orange --methods de --budget large".split())) == (
+    assert bench.requested(parse("bench --law rubber --json".split())) == ""
+    assert bench.requested(parse("bench --scaling orange --methods de --budget large".split())) == (
         "scaling"
     )
-    assert bench.asked(parse("bench --methods --device cuda --json".split())) == "methods"
-    assert bench.asked(parse("bench --peers".split())) == "peers"
+    assert bench.requested(parse("bench --methods --device cuda --json".split())) == "methods"
+    assert bench.requested(parse("bench --peers".split())) == "peers"
 
 
 def test_a_command_line_that_makes_no_sense(refused) -> None:
@@ -201,8 +201,8 @@ def test_aim_prints_one_json_object(tmp_path: Path, sling: Callable) -> None:
     assert answer["tcp_position_m"] is None
     assert "setup.base_to_fork is null" in answer["warnings"][-1]["what"]
     assert answer["interval_90_m"][0] < answer["predicted_landing_m"] < answer["interval_90_m"][1]
-    said = [f"warning: {warning['what']}" for warning in answer["warnings"]]
-    assert done.stderr.splitlines() == said
+    message = [f"warning: {warning['what']}" for warning in answer["warnings"]]
+    assert done.stderr.splitlines() == message
 
     params = tmp_path / "params.yaml"
     known = "base_to_fork: [0.5, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0]  #"

@@ -66,9 +66,11 @@ def test_a_refused_value_leaves_no_trace_of_a_run_aside(project: ProjectCopy) ->
 
 def test_a_refused_value_in_the_folder_says_how_it_goes(project: ProjectCopy) -> None:
     before = params(project)
-    with pytest.raises(AssertionError, match="many.*`sling reset KEY` takes it back, and") as said:
+    with pytest.raises(
+        AssertionError, match="many.*`sling reset KEY` takes it back, and"
+    ) as message:
         project(*RUN, "-S", "optimizer.k_top=many", "evidence@band2")
-    assert str(said.value).count("error: params.yaml: ") == 1
+    assert str(message.value).count("error: params.yaml: ") == 1
     assert params(project) != before
     done = python("-m", "app.cli", "reset", "optimizer.k_top", folder=project.folder)
     assert done.stdout == "optimizer.k_top was many, is 5 again\n", done.stderr

@@ -18,10 +18,10 @@ DRAW, LANDING = (-0.3, -0.17), 2.2
 @pytest.fixture
 def put(tmp_path, params, monkeypatch):
     """`observe` of band1 in an empty project, with the stages that DVC was asked for."""
-    asked = []
+    requested = []
 
     def dvc(root, arguments, **about):
-        asked.append(arguments)
+        requested.append(arguments)
         return status.pop() if status else 0, ["error: it broke"]
 
     monkeypatch.setattr(child, "dvc", dvc)
@@ -30,7 +30,7 @@ def put(tmp_path, params, monkeypatch):
     def run(draw=DRAW, landing=LANDING, band="band1", method="least_squares", **options) -> dict:
         return observe.observe(params, band, method, draw, landing, root=tmp_path, **options)
 
-    return SimpleNamespace(run=run, asked=asked, status=status, layout=Layout(tmp_path))
+    return SimpleNamespace(run=run, requested=requested, status=status, layout=Layout(tmp_path))
 
 
 def test_a_launch_is_written_below_the_others_and_the_policy_runs(put) -> None:
@@ -40,7 +40,7 @@ def test_a_launch_is_written_below_the_others_and_the_policy_runs(put) -> None:
     assert file.read_text() == (
         "draw_y_m,draw_z_m,draw_error_m,landing_y_m\n-0.3,-0.17,,2.2\n-0.32,-0.2,0.0,3.0\n"
     )
-    assert put.asked == [("repro", "policy@band1-least_squares")] * 2
+    assert put.requested == [("repro", "policy@band1-least_squares")] * 2
     answer = {"file": str(file), "launches": 1, "before": None, "after": None, "warnings": []}
     assert first == answer | {"measured_m": LANDING}
     assert list(file.parent.iterdir()) == [file]
@@ -48,7 +48,7 @@ def test_a_launch_is_written_below_the_others_and_the_policy_runs(put) -> None:
 
 def test_no_run_runs_nothing(put) -> None:
     assert put.run(run=False)["after"] is None
-    assert put.asked == []
+    assert put.requested == []
 
 
 def test_a_stage_that_fails_says_why_and_the_launch_stays(put) -> None:
@@ -70,7 +70,7 @@ def test_a_stage_that_fails_says_why_and_the_launch_stays(put) -> None:
 def test_refuses_what_is_no_launch(put, wrong: dict, message: str) -> None:
     with pytest.raises(UserError, match=message):
         put.run(**wrong)
-    assert put.asked == [] and not put.layout.evidence.exists()
+    assert put.requested == [] and not put.layout.evidence.exists()
 
 
 def test_refuses_a_launch_that_is_there_or_a_score(put) -> None:
@@ -105,7 +105,7 @@ def test_undo_takes_the_last_launch_out_and_the_policy_runs(put, params) -> None
     assert (put.layout.evidence / "band1.csv").read_text() == before
     assert (answer["launches"], answer["measured_m"]) == (1, 3.0)
     assert answer["removed"] == {"draw": [-0.32, -0.2], "error": 0.001}
-    assert put.asked == [("repro", "policy@band1-least_squares")]
+    assert put.requested == [("repro", "policy@band1-least_squares")]
     lines = observe.shown(answer | {"after": None}).splitlines()
     assert lines[0].endswith("1 launch as evidence")
     assert lines[1:] == ["taken out: the draw to -0.32, -0.2", "measured  3.000 m; nothing has run"]
@@ -113,25 +113,25 @@ def test_undo_takes_the_last_launch_out_and_the_policy_runs(put, params) -> None
     assert not (put.layout.evidence / "band1.csv").exists()
     with pytest.raises(UserError, match=r"band1.csv: holds no launch of band1"):
         undo(run=False)
-    assert len(put.asked) == 1
+    assert len(put.requested) == 1
 
 
 def test_a_launch_outside_its_interval_is_doubted_before_stages_run(
     put, monkeypatch, capsys
 ) -> None:
-    told = {"landing_m": 2.0, "interval_90_m": [1.9, 2.1], "failure": None}
-    monkeypatch.setattr(observe, "known", lambda *_: told)
+    summary = {"landing_m": 2.0, "interval_90_m": [1.9, 2.1], "failure": None}
+    monkeypatch.setattr(observe, "known", lambda *_: summary)
     for landing, doubts in ((2.09, 0), (1.91, 0), (2.11, 1), (1.89, 1)):
         answer = put.run((-0.3, -landing / 10), landing)
         assert [one["about"] for one in answer["warnings"]] == ["miss"] * doubts
         assert capsys.readouterr().err.count("lies outside the predicted interval") == doubts
-    monkeypatch.setattr(observe, "known", lambda *_: told | {"interval_90_m": None})
+    monkeypatch.setattr(observe, "known", lambda *_: summary | {"interval_90_m": None})
     assert put.run((-0.4, -0.2), 9.0)["warnings"] == []
 
 
 def test_a_launch_that_fails_in_simulation_is_told(put, monkeypatch, capsys) -> None:
-    told = {"landing_m": None, "interval_90_m": None, "failure": "the band is slack"}
-    monkeypatch.setattr(observe, "known", lambda *_: told)
+    summary = {"landing_m": None, "interval_90_m": None, "failure": "the band is slack"}
+    monkeypatch.setattr(observe, "known", lambda *_: summary)
     (warning,) = put.run()["warnings"]
     assert warning["about"] == "failure" and "counts for nothing" in warning["what"]
     assert capsys.readouterr().err == f"warning: {warning['what']}\n"
@@ -143,9 +143,9 @@ def test_a_draw_deeper_than_any_before_is_told_once(put, params, monkeypatch, ca
     episode = SimpleNamespace(time=np.arange(2.0), position=place, grasp_time=0.0, release_time=1.0)
     monkeypatch.setattr(observe.Episode, "load_all", lambda folder: [episode])
     draws = (-0.30, 0), (-0.352, 0), (-0.40, 0), (-0.38, 0), (-0.402, 0), (-0.45, 0)
-    told = [put.run(draw, 2.0 + i, run=False)["warnings"] for i, draw in enumerate(draws)]
-    assert [len(one) for one in told] == [0, 0, 1, 0, 0, 1]
-    first, second = (one[0]["what"] for one in told if one)
+    summary = [put.run(draw, 2.0 + i, run=False)["warnings"] for i, draw in enumerate(draws)]
+    assert [len(one) for one in summary] == [0, 0, 1, 0, 0, 1]
+    first, second = (one[0]["what"] for one in summary if one)
     assert "drew band1 to 0.400 m, 0.352 m was the most before" in first
     assert "count as of the softened band" in first and "0.402 m was the most" in second
     assert capsys.readouterr().err == f"warning: {first}\nwarning: {second}\n"
@@ -170,16 +170,16 @@ def with_method(params, method):
 
 
 def test_what_is_said_before_and_after() -> None:
-    told = {
+    summary = {
         "landing_m": 2.0,
         "interval_90_m": [1.9, 2.1],
         "failure": None,
         "returned_share": 1.0,
         "share_90": [0.9, 1.1],
     }
-    failed = {**told, "landing_m": None, "interval_90_m": None, "failure": "the band is slack"}
-    said = {"file": "x.csv", "launches": 2, "measured_m": 2.2, "before": told, "after": failed}
-    text = observe.shown(said)
+    failed = {**summary, "landing_m": None, "interval_90_m": None, "failure": "the band is slack"}
+    output = {"file": "x.csv", "launches": 2, "measured_m": 2.2, "before": summary, "after": failed}
+    text = observe.shown(output)
     assert text.splitlines() == [
         "x.csv: 2 launches as evidence",
         "before  landing 2.000 m (90 %: 1.900 to 2.100 m), returned share 1.000"

@@ -175,23 +175,28 @@ def known() -> dict[str, tuple]:
 @pytest.fixture
 def outcome(furnished, tmp_path_factory, monkeypatch, capsys):
     """Runs a command in a new project."""
-    asked: list = []
-    echo(monkeypatch, asked)
+    requested: list = []
+    echo(monkeypatch, requested)
 
     def run(line: str) -> tuple:
-        asked.clear()
+        requested.clear()
         place = tmp_path_factory.mktemp("place")
         shutil.copytree(furnished, place, dirs_exist_ok=True)
         monkeypatch.chdir(place)
         monkeypatch.setattr(sys, "argv", ["sling", *line.split()])
         with pytest.raises(SystemExit) as ended:
             cli.main()
-        said = [text.replace(str(place), "") for text in capsys.readouterr()]
-        assert "Traceback" not in said[1]
+        message = [text.replace(str(place), "") for text in capsys.readouterr()]
+        assert "Traceback" not in message[1]
         files = {
             one.relative_to(place): one.read_bytes() for one in place.rglob("*") if one.is_file()
         }
-        return ended.value.code, *said, files, [str(one).replace(str(place), "") for one in asked]
+        return (
+            ended.value.code,
+            *message,
+            files,
+            [str(one).replace(str(place), "") for one in requested],
+        )
 
     return run
 
@@ -209,41 +214,45 @@ def furnish(place: Path) -> None:
     (layout.evidence / "mine.csv").write_text("draw_y_m,draw_z_m,landing_y_m\n-0.30,-0.17,2.2\n")
 
 
-def echo(patch: pytest.MonkeyPatch, asked: list) -> None:
+def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
     """What takes long says what it was given."""
 
     def dvc(root, arguments, **about) -> tuple[int, list]:
-        asked.append(arguments)
+        requested.append(arguments)
         card = Layout(root).card(arguments[1].partition("@")[2])
         card.mkdir(parents=True)
         (card / "card.json").write_text(json.dumps(CARD))
         return 0, []
 
     def look_at(*given) -> Look:
-        said = SimpleNamespace(written=[], usable=True, to_text=lambda: repr(given[:1] + given[2:]))
-        said.to_json = lambda frames: json.dumps([repr(given[2:]), frames])
-        return Look(said)
+        message = SimpleNamespace(
+            written=[], usable=True, to_text=lambda: repr(given[:1] + given[2:])
+        )
+        message.to_json = lambda frames: json.dumps([repr(given[2:]), frames])
+        return Look(message)
 
     def bench(arguments: argparse.Namespace, what: str) -> str:
         given = vars(arguments).items()
-        return told(what, *(one for one in given if one[0] not in ("command", "refuse")))
+        return summary(what, *(one for one in given if one[0] not in ("command", "refuse")))
 
-    def told(*given, **more) -> str:
-        asked.append((*map(str, given), sorted(map(str, more.items()))))
+    def summary(*given, **more) -> str:
+        requested.append((*map(str, given), sorted(map(str, more.items()))))
         return "done"
 
     patch.setattr(child, "dvc", dvc)
     patch.setattr("app.fit.fit.stages_of", lambda root: {})
     patch.setattr("app.preflight.recordings.checked", lambda *given: [])
     patch.setattr("app.preflight.command.look_at", look_at)
-    patch.setattr("app.drift.drift.drift", lambda settings, band: {"band": told(band)})
+    patch.setattr("app.drift.drift.drift", lambda settings, band: {"band": summary(band)})
     patch.setattr("app.drift.drift.shown", str)
-    patch.setattr("app.export.export_of_run", lambda _, *what: (told(*what), {"what": 1}))
+    patch.setattr("app.export.export_of_run", lambda _, *what: (summary(*what), {"what": 1}))
     patch.setattr("app.export.shown", lambda folder, card: "in words")
     patch.setattr("app.reset._committed", lambda path: DEFAULTS.read_text("utf-8"))
-    patch.setattr("app.flow.run.run", told)
-    patch.setattr("app.flow.server.serve", told)
-    patch.setattr("validation.simulator.verification.verify", lambda _, device, extra: told(device))
+    patch.setattr("app.flow.run.run", summary)
+    patch.setattr("app.flow.server.serve", summary)
+    patch.setattr(
+        "validation.simulator.verification.verify", lambda _, device, extra: summary(device)
+    )
     patch.setattr("validation.simulator.verification.summary", lambda done: (done, 0))
     patch.setattr("validation.benchmarks.bench.bench", bench)
     patch.setattr("validation.figures.listed", lambda *given: [])

@@ -93,8 +93,10 @@ NAMES = st.lists(st.from_regex(r"[a-z][a-z0-9_]{0,30}", fullmatch=True), max_siz
 
 
 @settings(max_examples=10)
-@given(names=NAMES, mass=st.floats(1e-4, 1), kept=st.integers(0, 8), k_top=st.integers(1, 50))
-def test_whatever_is_changed_dvc_moves_no_line(tmp_path_factory, names, mass, kept, k_top) -> None:
+@given(names=NAMES, mass=st.floats(1e-4, 1), retained=st.integers(0, 8), k_top=st.integers(1, 50))
+def test_whatever_is_changed_dvc_moves_no_line(
+    tmp_path_factory, names, mass, retained, k_top
+) -> None:
     names = [f"my_{name}" for name in names]
     folder = tmp_path_factory.mktemp("changed")
 
@@ -103,12 +105,12 @@ def test_whatever_is_changed_dvc_moves_no_line(tmp_path_factory, names, mass, ke
         for name in names:
             content["bands"][name] = BAND | {"mass": mass}
             content["run"]["own"].append(name)
-        for name in names[kept:]:
+        for name in names[retained:]:
             del content["bands"][name]
             content["run"]["own"].remove(name)
 
     text = edited(TEXT, change)
-    assert parse(text).run.own == tuple(names[:kept])
+    assert parse(text).run.own == tuple(names[:retained])
     assert text == by_dvc(text, folder)
 
 

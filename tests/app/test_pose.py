@@ -105,8 +105,8 @@ def recorded(tmp_path_factory):
     path = root / RECORDING
     truth = write_bag(path, cameras=False, rate=200, pose_rate=100)
     recording = read_recording(path, PARAMS.setup)
-    kept = EpisodeGeometry.of(recording, geometry_of(recording, PARAMS.setup))
-    keep(root, {"geometry": kept.content()})
+    retained = EpisodeGeometry.of(recording, geometry_of(recording, PARAMS.setup))
+    keep(root, {"geometry": retained.content()})
     return root, truth
 
 
@@ -134,8 +134,8 @@ def test_the_recorded_draw_is_the_pose_that_the_robot_reported(recorded) -> None
     assert pose["tcp_frame"] == reported.header.frame_id == "base"
     place, turn = reported.pose.position, reported.pose.orientation
     np.testing.assert_allclose(pose["tcp_position_m"], [place.x, place.y, place.z], atol=1e-6)
-    told = np.array([turn.x, turn.y, turn.z, turn.w])
-    assert abs(told @ pose["tcp_quaternion_xyzw"]) == pytest.approx(1.0, abs=1e-9)
+    summary = np.array([turn.x, turn.y, turn.z, turn.w])
+    assert abs(summary @ pose["tcp_quaternion_xyzw"]) == pytest.approx(1.0, abs=1e-9)
     assert pose["warnings"] == ["as before"]
 
 
@@ -160,5 +160,5 @@ def test_a_base_that_is_not_known_is_one_warning(tmp_path) -> None:
     keep(tmp_path, {})
     old = at(-0.3, -0.3, standing(None), tmp_path)
     assert old["tcp_position_m"] is None
-    said = old["warnings"][1].what
-    assert "older version" in said and "\n" not in said
+    message = old["warnings"][1].what
+    assert "older version" in message and "\n" not in message

@@ -54,16 +54,16 @@ def content(root: Path) -> dict[Path, bytes]:
 
 
 def test_all_of_a_band_goes_and_nothing_else(project: Path) -> None:
-    kept = [file for band in OTHERS for file in put(project, band)]
-    gone, asked = put(project, "orange"), []
-    said = remove_band("orange", lambda lines: bool(asked.extend(lines) or True), project)
-    assert not any(file.exists() for file in gone) and all(file.is_file() for file in kept)
+    retained = [file for band in OTHERS for file in put(project, band)]
+    gone, requested = put(project, "orange"), []
+    output = remove_band("orange", lambda lines: bool(requested.extend(lines) or True), project)
+    assert not any(file.exists() for file in gone) and all(file.is_file() for file in retained)
     text = (project / "params.yaml").read_text("utf-8")
     assert "orange:" not in text and "  own:" in text and "  - orange_2\n" in text
-    lines = said.splitlines()
-    assert lines[0] == "orange removed:" and [line.strip() for line in lines[1:]] == asked
+    lines = output.splitlines()
+    assert lines[0] == "orange removed:" and [line.strip() for line in lines[1:]] == requested
     for one in (Layout(project).raw("orange"), Layout(project).card("orange")):
-        assert str(one) in asked  # a folder is one line
+        assert str(one) in requested  # a folder is one line
     remove_band("orange_2", lambda lines: True, project)
     assert (project / "params.yaml").read_text("utf-8") == DEFAULTS.read_text("utf-8")
 

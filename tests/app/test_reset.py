@@ -38,13 +38,13 @@ def change(path: Path, **values: object) -> None:
 
 def test_a_key_goes_back_and_others_stay(path: Path) -> None:
     change(path, optimizer__k_nn=7)
-    kept = path.read_text("utf-8")
+    retained = path.read_text("utf-8")
     change(path, optimizer__k_top="many", optimizer__mutation=[0.1, 0.2])  # `many` is refused
     assert reset(["optimizer.k_top", "optimizer.mutation"], path) == [
         "optimizer.mutation was [0.1, 0.2], is [0.5, 1.0] again",
         "optimizer.k_top was many, is 5 again",
     ]
-    assert path.read_text("utf-8") == kept
+    assert path.read_text("utf-8") == retained
     assert reset(["optimizer"], path) == ["optimizer.k_nn was 7, is 15 again"]
     assert path.read_text("utf-8") == TEXT and reset(["optimizer"], path) == []
 

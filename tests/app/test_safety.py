@@ -76,9 +76,12 @@ def test_a_draw_beyond_the_recorded_stretch_says_both_in_per_cent(params, projec
     """Two sides of a triangle: 0.1375 and 0.3 against 0.1375 and 0.4, rest length 0.52."""
     edit(project, "  - -0.30\n  - -0.10\n", "  - -0.30\n  - 0.0\n")
     (found,) = safety.of_draw(params, "band1", (-0.4, -0.1), project)
-    asked = 2 * np.hypot(0.1375, np.hypot(0.4, 0.1)) / 0.52 - 1
+    requested = 2 * np.hypot(0.1375, np.hypot(0.4, 0.1)) / 0.52 - 1
     recorded = 2 * np.hypot(0.1375, 0.3) / 0.52 - 1
-    assert f"by {100 * asked:.1f} %, its recordings by {100 * recorded:.1f} % at most" in found.what
+    assert (
+        f"by {100 * requested:.1f} %, its recordings by {100 * recorded:.1f} % at most"
+        in found.what
+    )
 
 
 def test_without_an_episode_the_recorded_stretch_is_unknown(params, tmp_path) -> None:
@@ -119,11 +122,11 @@ def test_params_that_changed_since_training_by_key_values_and_cure(params, proje
     then = identified(params, **{"loss.median_window": 9})
     del then["made_with"]["loss.held_out.length"]
     card(project, made_with=trained(params))
-    told = [hazard.what for hazard in of_policy(params, project, then)]
+    summary = [hazard.what for hazard in of_policy(params, project, then)]
     cure = f"since the policy was trained: `dvc repro {STAGE}` mends it"
-    assert told[0] == f"params.yaml: loss.held_out.length was not there, is 0.6, {cure}"
-    assert told[1] == f"params.yaml: loss.median_window was 9, is 7, {cure}"
-    assert len(told) == 2
+    assert summary[0] == f"params.yaml: loss.held_out.length was not there, is 0.6, {cure}"
+    assert summary[1] == f"params.yaml: loss.median_window was 9, is 7, {cure}"
+    assert len(summary) == 2
     edit(project, "max_force: 30.0", "max_force: 25.0")
     last = of_policy(load(project / "params.yaml"), project, then)[-1]
     assert last.what == f"params.yaml: setup.max_force was 30.0, is 25.0, {cure}"
@@ -139,9 +142,9 @@ def test_a_theta_identified_anew_hides_no_change_of_the_policys(params, project)
 def test_many_changes_are_three_and_the_names_of_the_others(params, project) -> None:
     values = {f"setup.{name}": 1e-3 for name in ("max_force", "fork_width", "fork_height")}
     card(project, made_with=trained(params, **values, **{"policy.seed": 7, "sling.mesh": "net"}))
-    told = of_policy(params, project)
-    assert abouts(told) == ["params"] * 4 and "policy.seed was 7, is 1" in told[0].what
-    assert told[3].what.endswith("also in setup.max_force, sling.mesh")
+    summary = of_policy(params, project)
+    assert abouts(summary) == ["params"] * 4 and "policy.seed was 7, is 1" in summary[0].what
+    assert summary[3].what.endswith("also in setup.max_force, sling.mesh")
 
 
 def test_a_card_that_does_not_tell(params, project) -> None:
@@ -169,8 +172,8 @@ def test_a_policy_without_a_card(params, project) -> None:
 def test_theta_of_a_run_and_by_hand(params, project) -> None:
     content = identified(params, **{"bands.band1.mass": 0.05})
     path, cure = Layout(project).theta("band1", "least_squares"), "theta@band1-least_squares"
-    told = [hazard.what for hazard in safety.of_identification(params, content, path)]
-    assert told == [
+    summary = [hazard.what for hazard in safety.of_identification(params, content, path)]
+    assert summary == [
         "params.yaml: bands.band1.mass was 0.05, is 0.023, since θ was identified:"
         f" `dvc repro {cure}` mends it"
     ]

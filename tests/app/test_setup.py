@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
-from app.setup import LabMeasures, asked, confirmed, fork_of, set_up, shown
+from app.setup import LabMeasures, confirmed, fork_of, requested, set_up, shown
 from pipeline.base.errors import UserError
 from pipeline.params import load
 from tests.project import DEFAULTS
@@ -153,15 +153,17 @@ def test_what_contradicts_is_one_line_and_nothing_is_written(path, measured, wor
 
 def test_a_user_is_asked_and_may_say_no(path, capsys) -> None:
     lines = iter(["0.7,0.1375,0.42", "mm", "700,-137.5,420", "0.7,-0.1375,0.42", *6 * [""]])
-    measured = asked(lambda question: next(lines))
+    measured = requested(lambda question: next(lines))
     assert measured == LabMeasures(left_tip=LEFT, right_tip=RIGHT)
-    told = capsys.readouterr().err
-    assert "must be X,Y,Z, got 'mm'" in told and "which looks like millimetres (0.7)" in told
+    summary = capsys.readouterr().err
+    assert "must be X,Y,Z, got 'mm'" in summary and "which looks like millimetres (0.7)" in summary
     before = path.read_bytes()
-    done = set_up(measured, path, lambda said: confirmed(said, lambda question: "n"))
+    done = set_up(measured, path, lambda message: confirmed(message, lambda question: "n"))
     assert path.read_bytes() == before and "nothing was written" in shown(done)
     assert "nothing was written" not in capsys.readouterr().err
-    assert set_up(measured, path, lambda said: confirmed(said, lambda question: ""))["written"]
+    assert set_up(measured, path, lambda message: confirmed(message, lambda question: ""))[
+        "written"
+    ]
 
 
 def test_the_command_line(path, sling) -> None:

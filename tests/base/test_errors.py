@@ -44,6 +44,8 @@ def test_what_a_disk_refuses_is_one_line(capsys) -> None:
 
 def test_a_file_of_another_user_names_both(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("os.geteuid", lambda: 4321)
-    said = errors.refused(PermissionError(errno.EACCES, "", str(tmp_path / "none" / "a")))
+    message = errors.refused(PermissionError(errno.EACCES, "", str(tmp_path / "none" / "a")))
     owner = tmp_path.stat().st_uid
-    assert said and f"{tmp_path} is user {owner}'s, you are 4321; have it yours (chown)" in said
+    assert (
+        message and f"{tmp_path} is user {owner}'s, you are 4321; have it yours (chown)" in message
+    )

@@ -40,7 +40,7 @@ def test_workers_end_with_their_pool(tmp_path: Path, number: int, status: int) -
     (folder / "busy.py").write_text(CODE)
     run = MarkedRun(folder)
     process = run.start(sys.executable, "busy.py")
-    assert wait(lambda: len(list(folder.glob("worker-*"))) >= 2, 30), run.said
+    assert wait(lambda: len(list(folder.glob("worker-*"))) >= 2, 30), run.message
     if number == signal.SIGINT:
         os.killpg(process.pid, number)  # as a terminal does
     else:
@@ -48,7 +48,7 @@ def test_workers_end_with_their_pool(tmp_path: Path, number: int, status: int) -
     assert process.wait(20) == status
     assert run.left() == []
     if number == signal.SIGINT:
-        assert run.said == "interrupted\n"
+        assert run.message == "interrupted\n"
     assert len(list(folder.glob("worker-*"))) < 6
 
 
@@ -58,5 +58,5 @@ def test_a_killed_worker_is_one_line() -> None:
 
 
 def test_a_pool_is_as_wide_as_the_environment_says() -> None:
-    told = "from pipeline.base.pool import Pool; print(Pool()._max_workers)"
-    assert python("-c", told, SLING_WORKERS="3").stdout == "3\n"
+    summary = "from pipeline.base.pool import Pool; print(Pool()._max_workers)"
+    assert python("-c", summary, SLING_WORKERS="3").stdout == "3\n"

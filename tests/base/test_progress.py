@@ -29,10 +29,10 @@ def clock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 
 def test_a_line_says_rate_and_time_left(clock, capsys: pytest.CaptureFixture) -> None:
-    told = Progress("policy-band1-x", 400, "iterations")
+    summary = Progress("policy-band1-x", 400, "iterations")
     for seconds in (2.0, 0.5):
         clock.now += seconds
-        told.advance(10, "mean error 0.52 cm")
+        summary.advance(10, "mean error 0.52 cm")
     first, second = capsys.readouterr().err.splitlines()
     what = "iterations  mean error 0.52 cm"
     assert first == f"policy-band1-x 10/400 {what}  5.0 iterations/s  1:18 left"
@@ -43,24 +43,24 @@ def test_a_line_says_rate_and_time_left(clock, capsys: pytest.CaptureFixture) ->
 
 
 def test_hours_left_have_minutes(clock, capsys: pytest.CaptureFixture) -> None:
-    told = Progress("x", 1000, "rollouts")
-    told.advance(1, seconds=10.0)
+    summary = Progress("x", 1000, "rollouts")
+    summary.advance(1, seconds=10.0)
     assert capsys.readouterr().err.endswith("2:46:30 left\n")
 
 
 def test_an_earlier_runs_units_count_as_done_but_not_for_the_rate(clock, capsys) -> None:
-    told = Progress("x", 100, "iterations")
-    told.done = 80
+    summary = Progress("x", 100, "iterations")
+    summary.done = 80
     clock.now += 1.0
-    told.advance(10)
+    summary.advance(10)
     assert capsys.readouterr().err == "x 90/100 iterations  10.0 iterations/s  0:01 left\n"
 
 
 def test_lines_are_told_no_more_often_than_asked_but_the_last_is(clock, capsys) -> None:
-    told = Progress("x", 26, "iterations", every=1.0)
+    summary = Progress("x", 26, "iterations", every=1.0)
     for _ in range(26):
         clock.now += 0.125
-        told.advance(1)
+        summary.advance(1)
     steps = [parse(line) for line in capsys.readouterr().err.splitlines()]
     assert [step.done for step in steps] == [1, 9, 17, 25, 26]
     assert {step.facts[0] for step in steps} == {"8.0 iterations/s"}
@@ -68,8 +68,8 @@ def test_lines_are_told_no_more_often_than_asked_but_the_last_is(clock, capsys) 
 
 def test_a_terminal_has_a_bar(clock, capsys, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    told = Progress("x", 2, "rollouts")
-    told.advance(1, seconds=0.0), told.advance(1, seconds=0.0)
+    summary = Progress("x", 2, "rollouts")
+    summary.advance(1, seconds=0.0), summary.advance(1, seconds=0.0)
     half, whole = capsys.readouterr().err.split("\r")[1:]
     assert half.startswith(f"x [{'#' * 15}{'-' * 15}] 1/2 rollouts") and "\n" not in half
     assert whole.startswith(f"x [{'#' * 30}] 2/2 rollouts") and whole.endswith("\n")

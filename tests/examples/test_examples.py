@@ -21,7 +21,7 @@ def copy(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def said(copy: Path, tmp_path: Path):
+def message(copy: Path, tmp_path: Path):
     """Gives what a script prints, run in an empty folder, where it leaves nothing."""
 
     def run(name: str) -> str:
@@ -46,16 +46,16 @@ def test_every_script_is_run_and_short() -> None:
         assert f"examples/{name}.py" in text.split('"""')[1] or name in RUN_ELSEWHERE
 
 
-def test_simulate_pull(said) -> None:
-    table = said("simulate_pull")
+def test_simulate_pull(message) -> None:
+    table = message("simulate_pull")
     peaks, recoils = numbers(r"([\d.]+) N +[\d.]+ N", table), numbers(r"(\d+) ms", table)
     assert peaks[1] / peaks[0] == pytest.approx(1.1, abs=0.01)  # 10 % stiffer
     assert peaks[2] > peaks[0] and recoils[3] > recoils[0]
 
 
 @pytest.mark.slow
-def test_identify_from_arrays(said) -> None:
-    text = said("identify_from_arrays")
+def test_identify_from_arrays(message) -> None:
+    text = message("identify_from_arrays")
     assert "\nsettled\n" in text
     found = r"mooney_share: ([-\d.]+)  \[[-\d.]+, [-\d.]+\], truth 0.3"
     assert numbers(found, text)[0] == pytest.approx(0.3, abs=0.1)
@@ -63,15 +63,15 @@ def test_identify_from_arrays(said) -> None:
 
 
 @pytest.mark.slow
-def test_own_optimizer(said) -> None:
-    text = said("own_optimizer")
+def test_own_optimizer(message) -> None:
+    text = message("own_optimizer")
     stiffness = numbers(r"youngs_modulus +([\d.e+]+)", text)
     assert len(stiffness) == 2 and all(abs(one / 2.2e5 - 1) < 0.15 for one in stiffness)
 
 
 @pytest.mark.slow
-def test_robot_loop(said) -> None:
-    text = said("robot_loop")
+def test_robot_loop(message) -> None:
+    text = message("robot_loop")
     low, high = numbers(r"expected ([\d.]+) to", text), numbers(r"to ([\d.]+) m, landed", text)
     landings = numbers(r"landed at ([\d.]+)", text)
     assert len(landings) == 3

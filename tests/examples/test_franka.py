@@ -54,14 +54,14 @@ class FakeFranka:
     """In franky's place: writes down what it is told, and moves nothing."""
 
     def __init__(self, grasps: bool = True, follows: bool = True) -> None:
-        self.told: list[tuple] = []
+        self.summary: list[tuple] = []
         self.grasps = grasps
         error = 0.0 if follows else 0.3
-        limit = SimpleNamespace(set=lambda value: self.told.append(("limit", value)))
+        limit = SimpleNamespace(set=lambda value: self.summary.append(("limit", value)))
         robot = SimpleNamespace(
             recover_from_errors=lambda: None,
-            set_collision_behavior=lambda *limits: self.told.append(("threshold", *limits)),
-            move=lambda motion: self.told.append(("move", motion)),
+            set_collision_behavior=lambda *limits: self.summary.append(("threshold", *limits)),
+            move=lambda motion: self.summary.append(("move", motion)),
             state=SimpleNamespace(q=[error] * 7, q_d=[0.0] * 7),
             translation_velocity_limit=limit,
             translation_acceleration_limit=limit,
@@ -69,11 +69,11 @@ class FakeFranka:
         future = SimpleNamespace(wait=lambda time: True, get=lambda: self.grasps)
 
         def tell(name: str, answer: object):
-            def said(*values: float) -> object:
-                self.told.append((name, *values))
+            def message(*values: float) -> object:
+                self.summary.append((name, *values))
                 return answer
 
-            return said
+            return message
 
         hand = SimpleNamespace(
             move=tell("open", True),
@@ -99,21 +99,21 @@ def test_the_fake_is_told_the_plan(execute, planned, monkeypatch) -> None:
     folder, plan = planned
     fake = FakeFranka()
     assert run(execute, monkeypatch, fake, folder) == 0
-    moves = [one[1] for one in fake.told if one[0] == "move"]
+    moves = [one[1] for one in fake.summary if one[0] == "move"]
     assert moves[0][0] == "joints"
     rows = plan.rows()
     ways = [row for row in rows if row["max_speed_m_s"] > 0]
     for (place, turn), row in zip(moves[2:], ways, strict=True):
         np.testing.assert_allclose(place, row["base"], atol=2e-4)  # of a sample after it
         np.testing.assert_allclose(turn, plan.hand, atol=1e-6)
-    fingers = [one for one in fake.told if one[0] in ("open", "grasp")]
+    fingers = [one for one in fake.summary if one[0] in ("open", "grasp")]
     assert [one[:2] for one in fingers] == [
         ("open", 0.08),  # before it begins
         ("grasp", 0.0),
         ("open", 0.08),
     ]
     assert fingers[1][3] == plan.grip_force
-    limits = [one[1] for one in fake.told if one[0] == "limit"]
+    limits = [one[1] for one in fake.summary if one[0] == "limit"]
     assert max(limits[::2]) <= max(row["max_speed_m_s"] for row in rows) + 1e-9
 
 
@@ -138,7 +138,7 @@ def test_an_aim_is_drawn_to_from_the_plans_lift(execute, planned, monkeypatch, t
     assert aimed["pull"].speed == pytest.approx(2 * way / 3.0)
     fake = FakeFranka()
     assert run(execute, monkeypatch, fake, folder, "--aim", answer(tmp_path)) == 0
-    assert fake.told[-1][:2] == ("open", 0.08)
+    assert fake.summary[-1][:2] == ("open", 0.08)
 
 
 @pytest.mark.parametrize(
@@ -153,9 +153,9 @@ def test_an_aim_that_cannot_be_done_moves_nothing(
     execute, planned, monkeypatch, tmp_path, capsys, changes, words
 ) -> None:
     fake, file = FakeFranka(), answer(tmp_path, **changes)
-    assert run(execute, monkeypatch, fake, planned[0], "--aim", file) == 1 and not fake.told
-    said = capsys.readouterr().err
-    assert words in said and said.count("\n") == 1
+    assert run(execute, monkeypatch, fake, planned[0], "--aim", file) == 1 and not fake.summary
+    message = capsys.readouterr().err
+    assert words in message and message.count("\n") == 1
 
 
 def test_another_frame_or_gripper_moves_nothing(execute, planned, monkeypatch, tmp_path, capsys):
@@ -170,7 +170,7 @@ def test_another_frame_or_gripper_moves_nothing(execute, planned, monkeypatch, t
         ("none", "No such file"),
     ):
         fake = FakeFranka()
-        assert run(execute, monkeypatch, fake, tmp_path / name) == 1 and not fake.told
+        assert run(execute, monkeypatch, fake, tmp_path / name) == 1 and not fake.summary
         assert words in capsys.readouterr().err
 
 
@@ -181,7 +181,7 @@ def test_it_stops_where_the_fingers_or_a_joint_fail(execute, planned, monkeypatc
     ):
         assert run(execute, monkeypatch, fake, planned[0]) == 1
         assert words in capsys.readouterr().err
-        assert not [one for one in fake.told if one[0] == "open"][1:]
+        assert not [one for one in fake.summary if one[0] == "open"][1:]
 
 
 def test_the_launch_file_records_what_the_docs_say(monkeypatch) -> None:

@@ -33,8 +33,8 @@ def test_two_cubic_springs_pull_as_the_law(chain, share) -> None:
     chain = replace(chain, mooney_share=share)
     strain = np.linspace(0.1, chain.largest_strain, 50)
     error = pulled_by_two(chain, strain) / chain.pull(strain) - 1
-    told = chain.cubic_springs()[3]
-    assert np.abs(error).max() <= told * (1 + 1e-9) and told < 0.006  # both sums round
+    summary = chain.cubic_springs()[3]
+    assert np.abs(error).max() <= summary * (1 + 1e-9) and summary < 0.006  # both sums round
     assert (pulled_by_two(chain, np.array([-0.5, 0.0])) == 0).all()  # it never pushes
 
 

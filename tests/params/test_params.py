@@ -89,7 +89,7 @@ def test_every_text_refuses_a_number() -> None:
 
 
 def test_no_model_has_a_default() -> None:
-    """What a run hangs on stands in params.yaml alone: the models are no stage's dependency."""
+    """What a run depends on stands in params.yaml alone: the models are no stage's dependency."""
 
     def models(base: type) -> list[type]:
         return [base, *(one for sub in base.__subclasses__() for one in models(sub))]
@@ -271,10 +271,10 @@ def test_the_steps_of_a_run_are_those_of_its_methods_searches() -> None:
         "params.yaml: run.steps.clusters: must list those of run.methods whose search has this"
         " step: [sling2sim2real]"
     )
-    said = refusal(changed(("methods", "de"), CONTENT["methods"]["bo"]))
-    assert "run.ablations.steps.de: must list those of run.ablations.methods" in said
-    said = refusal(changed(("run", "ablations", "rig"), []))
-    assert "run.ablations.rig: must list those of run.ablations.bands" in said
+    output = refusal(changed(("methods", "de"), CONTENT["methods"]["bo"]))
+    assert "run.ablations.steps.de: must list those of run.ablations.methods" in output
+    output = refusal(changed(("run", "ablations", "rig"), []))
+    assert "run.ablations.rig: must list those of run.ablations.bands" in output
 
 
 def test_a_methods_regions_need_rollouts() -> None:

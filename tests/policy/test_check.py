@@ -26,10 +26,10 @@ def test_it_launches_the_draws_themselves(trained) -> None:
     truth = np.abs(toy.launch(trained.policy.draws(targets)).landing_y - targets)
     found = check(trained.policy, toy.launch, params())
     assert found == PolicyCheck(pytest.approx(truth.mean()), pytest.approx(truth.max()), {})
-    told = figures(trained, found)
-    assert told["converged"] and told["mean_error_m"] <= CONVERGED
-    assert told["map_mean_error_m"] == trained.mean_error != told["mean_error_m"]
-    assert verdict(told, found.failures).startswith("converged, mean |y_p - g| 0.")
+    summary = figures(trained, found)
+    assert summary["converged"] and summary["mean_error_m"] <= CONVERGED
+    assert summary["map_mean_error_m"] == trained.mean_error != summary["mean_error_m"]
+    assert verdict(summary, found.failures).startswith("converged, mean |y_p - g| 0.")
     assert figures(trained, found, "simulated")["map_mean_error_m"] is None
 
 
@@ -42,10 +42,10 @@ def test_a_launch_off_the_map_is_no_convergence(trained) -> None:
         return launched
 
     found = check(trained.policy, further, params())
-    told = figures(trained, found)
-    assert not told["converged"] and told["map_mean_error_m"] < CONVERGED
-    assert told["mean_error_m"] == pytest.approx(0.03, abs=0.005)
-    assert verdict(told, found.failures).startswith("NOT converged, mean |y_p - g| ")
+    summary = figures(trained, found)
+    assert not summary["converged"] and summary["map_mean_error_m"] < CONVERGED
+    assert summary["mean_error_m"] == pytest.approx(0.03, abs=0.005)
+    assert verdict(summary, found.failures).startswith("NOT converged, mean |y_p - g| ")
 
 
 def test_failures_are_counted_by_reason_and_forbid_convergence(trained) -> None:
@@ -59,14 +59,14 @@ def test_failures_are_counted_by_reason_and_forbid_convergence(trained) -> None:
     )
     found = check(trained.policy, broken, weak)
     assert found.failures["it broke"] == 5 and 1 <= found.failures[TOO_MUCH_FORCE] < 50
-    told = figures(trained, found)
-    assert told["failed_targets"] == sum(found.failures.values())
-    assert told["mean_error_m"] < CONVERGED and not told["converged"]
-    assert "it broke 5" in verdict(told, found.failures)
+    summary = figures(trained, found)
+    assert summary["failed_targets"] == sum(found.failures.values())
+    assert summary["mean_error_m"] < CONVERGED and not summary["converged"]
+    assert "it broke 5" in verdict(summary, found.failures)
 
 
 def test_where_nothing_lands_there_is_no_error() -> None:
     none = PolicyCheck(float("nan"), float("nan"), {"it broke": 256})
-    told = figures(TRAINED, none)
-    assert not told["converged"]
-    assert verdict(told, none.failures) == "NOT converged; 256 of 256 targets fail: it broke 256"
+    summary = figures(TRAINED, none)
+    assert not summary["converged"]
+    assert verdict(summary, none.failures) == "NOT converged; 256 of 256 targets fail: it broke 256"

@@ -47,10 +47,10 @@ def test_reward_is_the_papers(env) -> None:
 
 def test_targets_cover_the_range_and_change_every_step(env) -> None:
     first = env.get_observations()["target"]
-    kept = first.clone()
+    retained = first.clone()
     assert (env.get_observations()["target"] == first).all()
     second, *_ = env.step(torch.zeros(400, 2))
-    assert first.shape == (400, 1) and (first == kept).all()
+    assert first.shape == (400, 1) and (first == retained).all()
     assert not (second["target"] == first).any()
     for observed in (first, second["target"]):
         assert -1 <= observed.min() < -0.97 and 0.97 < observed.max() <= 1

@@ -127,12 +127,12 @@ sys.modules |= dict.fromkeys(ours)  # whoever imports one of them fails
 sys.argv = ["policy_elsewhere.py", ".", "2.6"]
 runpy.run_path("policy_elsewhere.py", run_name="__main__")
 """
-    said = apart(code, tmp_path)
+    message = apart(code, tmp_path)
     y, z = stored.draws(np.array([2.6]))[0]
-    assert said.startswith(f"draw to y = {y:.3f} m, z = {z:.3f} m\n")
-    assert "frame: origin midway between the fork tips, y towards the target, z up" in said
-    assert "trained for targets from 1.425 to 2.425 m" in said and "did not converge" in said
-    assert "the arm may hold 30 N" in said and "draw in 4.0 s, wait 2.0 s" in said
+    assert message.startswith(f"draw to y = {y:.3f} m, z = {z:.3f} m\n")
+    assert "frame: origin midway between the fork tips, y towards the target, z up" in message
+    assert "trained for targets from 1.425 to 2.425 m" in message and "did not converge" in message
+    assert "the arm may hold 30 N" in message and "draw in 4.0 s, wait 2.0 s" in message
 
 
 def test_equal_networks_give_equal_bytes(trained, folder, tmp_path) -> None:

@@ -60,8 +60,8 @@ def test_a_theta_whose_launches_all_fail_is_said_not_to_converge(project, capsys
     project(launch=toy.broken)
     (line,) = capsys.readouterr().out.splitlines()
     assert "NOT converged; 256 of 256 targets fail: the simulation did not converge 256" in line
-    told = STORED.card()["training"]
-    assert told["converged"] is False and told["mean_error_m"] is None
+    summary = STORED.card()["training"]
+    assert summary["converged"] is False and summary["mean_error_m"] is None
     assert np.isfinite(STORED.draws(np.array([1.9]))).all()
 
 

@@ -60,9 +60,9 @@ class Played:
         """Without noise and bias, in the wrench's frame."""
         bent = self.middle(t + H) - 2 * self.middle(t) + self.middle(t - H)
         band = np.array([self.truth.force(x) for x in t])
-        felt = band + self.mass * (GRAVITY - bent / H**2)
+        response = band + self.mass * (GRAVITY - bent / H**2)
         frame = BASE[0] if self.fixed else self.orientation(t) * SENSOR
-        return self.truth.sign * frame.inv().apply(felt)
+        return self.truth.sign * frame.inv().apply(response)
 
     def recording(self) -> SimpleNamespace:
         """With the streams that signals and delays need."""

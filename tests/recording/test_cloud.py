@@ -81,8 +81,8 @@ def test_of_a_thin_band_no_more_neighbours_are_asked_for_than_it_has() -> None:
     line = np.column_stack([np.arange(0, 0.4, 0.003), *np.zeros((2, 134))])
     line = line[np.random.default_rng(0).random(134) > 0.4]
     strict = cloud.sample(line, SETTINGS)
-    kept = cloud.sample(line, SETTINGS, density=1 / 0.003)
-    assert len(kept) > 0.9 * len(line) > 2 * len(strict)
+    retained = cloud.sample(line, SETTINGS, density=1 / 0.003)
+    assert len(retained) > 0.9 * len(line) > 2 * len(strict)
 
 
 def test_a_recording_in_which_no_band_is_seen_is_refused(monkeypatch) -> None:

@@ -20,9 +20,11 @@ def test_points_of_the_arm_in_the_hanging_band_are_said(checked, params) -> None
     rows = over_time(checked.scene, replace(clouds, points=points), 0.0)
     assert rows[1].phase == "hanging" and rows[1].off_plane == pytest.approx(0.05, abs=0.01)
     assert all(row.off_plane in (None, 0.0) for row in (rows[0], *rows[2:]))
-    (said,) = [one.what for one in of_coverage(rows) if one.about == "off_plane"]
-    told = sum(row.off_plane is not None for row in rows)
-    assert said.startswith(f"1 of {told} pictures of the hanging band hold points off the plane")
+    (message,) = [one.what for one in of_coverage(rows) if one.about == "off_plane"]
+    summary = sum(row.off_plane is not None for row in rows)
+    assert message.startswith(
+        f"1 of {summary} pictures of the hanging band hold points off the plane"
+    )
 
 
 def test_the_plane_is_that_of_the_tips_and_the_hand(checked) -> None:

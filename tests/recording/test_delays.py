@@ -155,8 +155,8 @@ def test_two_estimates_are_weighed_or_said(looked_at, params, monkeypatch, back,
 
 
 def given(params, **delays):
-    told = params.episode.delays.model_copy(update=delays)
-    episode = params.episode.model_copy(update={"delays": told})
+    summary = params.episode.delays.model_copy(update=delays)
+    episode = params.episode.model_copy(update={"delays": summary})
     return params.model_copy(update={"episode": episode})
 
 
@@ -164,8 +164,8 @@ def test_given_delays_that_are_right_are_kept(looked_at, params) -> None:
     """To the digit, with an error of their own where nothing ties them better."""
     recording, geometry = looked_at
     changed = late(late(recording, "pose", -0.012), "depth", 0.3)
-    told = given(params, pose=-0.012, camera=0.3)
-    right, found = correct_delays(Pull(late(changed, "color", 0.3), geometry), told)
+    summary = given(params, pose=-0.012, camera=0.3)
+    right, found = correct_delays(Pull(late(changed, "color", 0.3), geometry), summary)
     assert (found.pose.value, found.camera.value) == (-0.012, 0.3)
     assert found.pose.source == found.camera.source == "setup" and not found.conflict
     assert 0 < found.pose.left < 0.003 and 0 < found.camera.left < 0.002
@@ -183,13 +183,13 @@ def test_a_given_delay_that_the_recording_does_not_show(looked_at, params, monke
 
 
 @pytest.mark.parametrize("told", [0.0, 0.03])
-def test_a_given_delay_that_is_wrong_is_put_right(looked_at, params, told) -> None:
+def test_a_given_delay_that_is_wrong_is_put_right(looked_at, params, summary) -> None:
     """The camera is 12 ms late, whatever was given."""
     recording, geometry = looked_at
     pull = Pull(late(late(recording, "depth", 0.012), "color", 0.012), geometry)
-    right, found = correct_delays(pull, given(params, camera=told))
+    right, found = correct_delays(pull, given(params, camera=summary))
     assert found.camera.value == pytest.approx(0.012, abs=0.001) and found.camera.applied
-    assert found.camera.rest == pytest.approx(0.012 - told, abs=0.001)
+    assert found.camera.rest == pytest.approx(0.012 - summary, abs=0.001)
     assert found.camera.left < 0.002
     off = (right.recording.depth.stamp - recording.depth.stamp) * 1e-9
     np.testing.assert_allclose(off, 0, atol=1e-3)

@@ -32,8 +32,8 @@ def test_release_between_samples_is_unbiased_and_its_error_is_true(rate, noise) 
         release = 7.5 + random.uniform(0, 7 / rate)
         fall = random.choice([0.0, random.uniform(0, 6e-3)])
         t, force = pull(release, fall, noise, seed, rate, start=5.0)
-        kept = random.random(len(t)) >= 0.02
-        found = find_release(t[kept], force[kept])
+        retained = random.random(len(t)) >= 0.02
+        found = find_release(t[retained], force[retained])
         off.append(found.time - release)
         error.append(found.error)
         resolution.append(found.resolution)

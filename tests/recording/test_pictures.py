@@ -52,8 +52,8 @@ def test_what_can_be_decoded_is_read_and_the_rest_is_counted_as_colour(tmp_path)
     padded = looked_at(tmp_path, of_color(lambda k, data: data + bytes(3000)))
     assert padded.clouds.damaged == padded.clouds.damaged_colors == 0
     some = looked_at(tmp_path, of_color(lambda k, data: data[: len(data) // (1 + (k % 4 == 0))]))
-    said = [one.what for one in pictures.findings(some) if one.about == "damaged"]
-    assert said == [f"{some.clouds.damaged_colors} colour pictures cannot be decoded"]
+    output = [one.what for one in pictures.findings(some) if one.about == "damaged"]
+    assert output == [f"{some.clouds.damaged_colors} colour pictures cannot be decoded"]
     assert len(some.clouds.points) + some.clouds.damaged == len(padded.clouds.points)
 
 
@@ -86,7 +86,9 @@ def written(pixels: np.ndarray, factor: float, kind: type, swapped: bool = False
         (0.001, np.float32, False, None),
     ],
 )
-def test_depth_of_another_unit_or_order(tmp_path, monkeypatch, factor, kind, swapped, said) -> None:
+def test_depth_of_another_unit_or_order(
+    tmp_path, monkeypatch, factor, kind, swapped, output
+) -> None:
     """What a driver would send is put in the place of what the recording holds."""
     from pipeline.recording import build
     from pipeline.recording.input.reader import Recording
@@ -102,8 +104,8 @@ def test_depth_of_another_unit_or_order(tmp_path, monkeypatch, factor, kind, swa
         return replace(recording, depth=replace(recording.depth, values=values))
 
     monkeypatch.setattr(build, "read_recording", driver)
-    if said is None:
+    if output is None:
         assert looked_at(tmp_path, lambda kind, stamp, message: message).clouds.empty == 0
         return
-    with pytest.raises(UserError, match=said):
+    with pytest.raises(UserError, match=output):
         looked_at(tmp_path, lambda kind, stamp, message: message)

@@ -54,8 +54,8 @@ def test_old_pictures_over_the_release_are_refused() -> None:
         replace(SOUND, repeated=(0.01,)),
         replace(SOUND, drawn=0.2, gone=0.23, earliest=0.18, latest=0.23, repeated=(0.1, 0.2)),
     ):
-        (said,) = of_release(odd)
-        assert said.about == "frozen_pictures" and said.refused
+        (message,) = of_release(odd)
+        assert message.about == "frozen_pictures" and message.refused
 
 
 def test_a_band_that_is_never_let_go_is_refused(pull, params) -> None:
@@ -67,8 +67,8 @@ def test_a_band_that_is_never_let_go_is_refused(pull, params) -> None:
     found = release_pictures(replace(pull, recording=frozen), params.setup.fork_width)
     assert found.never and found.beyond == 0 and found.frozen
     for one in (found, replace(found, repeated=())):
-        (said,) = of_release(one)
-        assert said.refused
+        (message,) = of_release(one)
+        assert message.refused
 
 
 @pytest.mark.fires("release_pictures", "smeared_pictures")
@@ -76,6 +76,6 @@ def test_impossible_and_smeared_pictures_are_said() -> None:
     late = replace(SOUND, drawn=0.06, gone=0.09, earliest=0.045, latest=0.09)
     again = replace(SOUND, again=(0.15,))
     smeared = replace(SOUND, faded=(0.4, 0.3, 0.1))
-    said = [one.about for odd in (late, again, smeared) for one in of_release(odd)]
-    assert said == ["release_pictures", "release_pictures", "smeared_pictures"]
+    message = [one.about for odd in (late, again, smeared) for one in of_release(odd)]
+    assert message == ["release_pictures", "release_pictures", "smeared_pictures"]
     assert not list(of_release(SOUND)) and np.isclose(SOUND.error, 0.05 / np.sqrt(12))

@@ -87,9 +87,9 @@ def test_a_tool_that_nobody_told_of_is_felt(params) -> None:
     assert inertia.mass == pytest.approx(MASS, rel=0.03)
     found = band_alone(played, params, inertia)
     assert found.facts.tool.source == "its inertia"
-    told = signals(played, params, tool(mass=0.0), inertia=inertia)
+    summary = signals(played, params, tool(mass=0.0), inertia=inertia)
     given = ToolFacts(0.0, list(TOOL), "setup.tool")
-    assert told.facts.tool == given
+    assert summary.facts.tool == given
 
 
 def test_a_sensor_that_takes_off_too_much_or_has_the_other_sign(params) -> None:
@@ -202,8 +202,8 @@ def test_a_recorded_twist_is_compared(params) -> None:
     for factor, size in ((1.0, 0.002), (1.5, None)):
         twist = np.hstack([factor * speed, np.zeros((len(t), 3))])
         recording.twist = stream("/arm/twist", t, twist)
-        said = signals(played, params, recording=recording).facts.twist_difference
-        assert said < size if size else said > 0.02
+        message = signals(played, params, recording=recording).facts.twist_difference
+        assert message < size if size else message > 0.02
 
 
 @pytest.mark.parametrize("topic", ["wrench", "pose"])

@@ -59,10 +59,10 @@ def drawn(shift=(0, 0, 0), turn=(0, 0, 0), hand_shift=(0, 0, 0), stiffness=None,
         cloud = np.concatenate(points) + random.normal(0, NOISE, (sum(map(len, points)), 3))
         clouds.append(Rotation.from_rotvec(turn).apply(cloud) + shift)
         forces.append(force)
-    said = hands + hand_shift
+    stated = hands + hand_shift
 
     def at(time):
-        return np.stack([np.interp(time, times, axis) for axis in said.T], axis=-1)
+        return np.stack([np.interp(time, times, axis) for axis in stated.T], axis=-1)
 
     signals = SimpleNamespace(
         time=times, force=np.array(forces), hand=at, grasp_time=-1.0, release_time=9.0

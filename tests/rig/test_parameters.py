@@ -137,7 +137,7 @@ class Laboratory:
             arguments = string, hanging, motion, sensor_times, camera_times, seen
             done = self.pull_and_release(*arguments)
             rounded = {name: getattr(done, name).round(9) for name in ("force", "acceleration")}
-            self.done[key] = replace(done, **rounded)  # the last bits hang on the frames
+            self.done[key] = replace(done, **rounded)  # the last bits depend on the frames
         return self.done[key]
 
     def __call__(self, params: Params) -> dict[str, Any]:
@@ -161,7 +161,7 @@ def rough(params: Params) -> Params:
 
 @pytest.mark.slow
 def test_a_pull_with_dips_is_longer_and_another(params, tmp_path, monkeypatch) -> None:
-    """By `rig.pull`, or by the band's own; what is not pulled so does not hang on the dips."""
+    """By `rig.pull`, or by the band's own; what is not pulled so does not depend on the dips."""
     world = with_(rough(params), "plan", dips=DIPS)
     laboratory = Laboratory(tmp_path / "band1.mcap", monkeypatch)
     plain, dipped = laboratory(world), laboratory(with_(world, "rig", pull="informative"))

@@ -86,10 +86,10 @@ def test_air_brakes_a_band_as_a_cylinder_across_the_wind_and_not_along_it(sling)
     table[0] = steps([0.0, H], H, grip=Grip.FREE)[0]
     start, time = along_x(light, 1.0), 0.3
     done = stepped(light, table, neo(THETA), start)
-    told = terminal**2 / GRAVITY * np.log(np.cosh(GRAVITY * time / terminal))
-    assert told < 0.9 * GRAVITY * time**2 / 2  # it counts
+    summary = terminal**2 / GRAVITY * np.log(np.cosh(GRAVITY * time / terminal))
+    assert summary < 0.9 * GRAVITY * time**2 / 2  # it counts
     fallen = start[:, 2] - done.state[0, :, 2]
-    assert fallen == pytest.approx(np.full(len(fallen), told), rel=5e-3)
+    assert fallen == pytest.approx(np.full(len(fallen), summary), rel=5e-3)
     upright = start[:, [1, 2, 0, 4, 5, 3, 7, 8, 6]]
     done = stepped(light, table, neo(THETA), upright)
     drop = (upright[:, 2] - done.state[0, :, 2]).mean()

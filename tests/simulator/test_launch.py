@@ -37,10 +37,10 @@ def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch, launch_se
     rng = np.random.default_rng(6)
     draws = np.column_stack([rng.uniform(-0.45, -0.1, 9), rng.uniform(-0.3, -0.1, 9)])
     thetas = np.column_stack([10 ** rng.uniform(5, 6.2, 9), np.tile(THETA[1:], (9, 1))])
-    one, asked = launch(sling, launch_setup, neo(thetas), draws), []
+    one, requested = launch(sling, launch_setup, neo(thetas), draws), []
 
     def run(sling, schedule, slings, options):
-        asked.append((options.device, len(slings)))
+        requested.append((options.device, len(slings)))
         return solver.run(sling, schedule, slings, options=replace(options, device="cpu"))
 
     module = import_module("pipeline.simulator.launch")
@@ -51,9 +51,9 @@ def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch, launch_se
         (1, {("a", 3), ("b", 3), ("c", 3)}),
     ):
         monkeypatch.setattr(module, "SHARE", share)
-        asked.clear()
+        requested.clear()
         several = launch(sling, launch_setup, neo(thetas), draws, device=("a", "b", "c"))
-        assert set(asked) == expected and several.failure == one.failure
+        assert set(requested) == expected and several.failure == one.failure
         for name in ("landing_y", "speed", "angle", "hold_force", "separation_time"):
             np.testing.assert_array_equal(getattr(several, name), getattr(one, name))
     assert 0 < sum(reason is None for reason in one.failure) < 9

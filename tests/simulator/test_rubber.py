@@ -112,10 +112,10 @@ def test_memory_of_a_pull_is_that_of_short_steps_and_fades(rubber):
     depth = 0.4 * part**2 * (3 - 2 * part)
     stretch = np.maximum(2 * np.hypot(rubber.half_width, depth) / rubber.rest_length, 1)
     stress = stretch - stretch**-2
-    told = np.zeros(len(TIMES))
+    summary = np.zeros(len(TIMES))
     for change in np.diff(stress):
-        told += change - step * told / TIMES
-    np.testing.assert_allclose(carried, told / stress[-1], atol=2e-3)
+        summary += change - step * summary / TIMES
+    np.testing.assert_allclose(carried, summary / stress[-1], atol=2e-3)
     assert np.all(np.diff(carried) >= -1e-12)  # slow branches keep more
     assert unrelaxed(rubber, LaunchHistory(4.0, 1e6), gum(), drawn).max() < 1e-6
     slack = np.array([[-0.01, 0.0]])

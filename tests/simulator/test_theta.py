@@ -49,9 +49,9 @@ def test_what_is_no_json_object(tmp_path: Path) -> None:
 
 def test_the_drag_comes_back(tmp_path: Path) -> None:
     file = tmp_path / "theta.json"
-    said = {"air_drag": 2.5}
-    file.write_text(json.dumps({"band": "red", "theta": SOFT, "nuisances": said}))
-    assert load_theta(file, "red")["nuisances"] == said
+    output = {"air_drag": 2.5}
+    file.write_text(json.dumps({"band": "red", "theta": SOFT, "nuisances": output}))
+    assert load_theta(file, "red")["nuisances"] == output
     found = parameters_of(load_theta(file, "red"))
     assert found.column("air_drag").tolist() == [2.5]
     assert parameters_of({"theta": SOFT}).column("air_drag").tolist() == [0.0]
@@ -87,7 +87,7 @@ def test_the_law_rubber_names_its_parameters(tmp_path: Path) -> None:
 
 
 def test_bad_nuisances_are_one_line(tmp_path: Path) -> None:
-    for said, message in (
+    for output, message in (
         ({"drag": 1.0}, "nuisances.drag: unknown key, the closest known one is air_drag"),
         ([1.0], "nuisances: must be a mapping"),
         (None, "nuisances: must be a mapping"),
@@ -97,7 +97,7 @@ def test_bad_nuisances_are_one_line(tmp_path: Path) -> None:
         ({"air_drag": True}, "nuisances.air_drag: must be a number between 0 and 50"),
         ({"camera_delay": 0.001}, "nuisances.camera_delay: unknown key"),
     ):
-        text = json.dumps({"band": "red", "theta": SOFT, "nuisances": said})
+        text = json.dumps({"band": "red", "theta": SOFT, "nuisances": output})
         assert message in refusal(tmp_path / "theta.json", text)
 
 

@@ -45,9 +45,9 @@ def test_every_public_name_has_a_docstring_and_every_function_an_example() -> No
 def test_functions_say_what_they_take_and_raise() -> None:
     for name, thing in vars(sling2sim2real).items():
         if inspect.isfunction(thing):
-            said = thing.__doc__
-            assert "Args:" in said and "Raises:" in said, name
-            lacking = [one for one in inspect.signature(thing).parameters if one not in said]
+            message = thing.__doc__
+            assert "Args:" in message and "Raises:" in message, name
+            lacking = [one for one in inspect.signature(thing).parameters if one not in message]
             assert not lacking, f"{name}: {lacking}"
 
 

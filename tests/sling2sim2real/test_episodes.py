@@ -72,8 +72,8 @@ def test_large_clouds_are_thinned_and_episodes_are_kept(tmp_path) -> None:
         ({"grasp_time": -1.0}, "too late for the grasp at -1.00 s"),
     ],
 )
-def test_wrong_arrays_are_refused_by_name(wrong: dict, said: str) -> None:
-    with pytest.raises(UserError, match=said):
+def test_wrong_arrays_are_refused_by_name(wrong: dict, message: str) -> None:
+    with pytest.raises(UserError, match=message):
         episode_from_arrays(**still(np.arange(0, 5, 1e-3), release=4.0) | wrong)
 
 

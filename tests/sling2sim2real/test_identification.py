@@ -27,8 +27,8 @@ def found(band, settings, world, episode) -> Identification:
 
 @pytest.mark.slow
 def test_a_known_band_is_found_without_a_start(band, settings, world, episode) -> None:
-    told = []
-    found = identify([episode], band, settings=settings, progress=told.append)
+    summary = []
+    found = identify([episode], band, settings=settings, progress=summary.append)
     assert found.settled
     for name in FITTED:
         one = found.intervals[name]
@@ -37,7 +37,7 @@ def test_a_known_band_is_found_without_a_start(band, settings, world, episode) -
         assert one.identifiable or name == "elasticity_damping"  # which one picture hardly tells
     assert not found.intervals["dynamic_friction"].identifiable
     assert found.samples.shape == (200, len(found.theta.names))
-    assert [line.split()[0] for line in told[:3]] == ["mounting:", "explored", "expansion"]
+    assert [line.split()[0] for line in summary[:3]] == ["mounting:", "explored", "expansion"]
     assert abs(np.degrees(np.arcsin(found.mounting.clamp_direction[0]))) < 10
 
 
@@ -88,5 +88,5 @@ def test_a_run_of_other_settings_says_what_has_changed(tmp_path) -> None:
     )
     found = Identification.of_run("band1", root=tmp_path)
     assert found.changed == ("bands.band1.mass was 0.05, is 0.023",)
-    told = [*_warnings(found, (-0.3, -0.1), None, (1.9, 2.1))]
-    assert told[-1] == f"params.yaml: {found.changed[0]}, since θ was identified"
+    summary = [*_warnings(found, (-0.3, -0.1), None, (1.9, 2.1))]
+    assert summary[-1] == f"params.yaml: {found.changed[0]}, since θ was identified"

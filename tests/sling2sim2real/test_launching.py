@@ -42,8 +42,8 @@ def test_the_interval_holds_what_samples_say(world, aimed) -> None:
     narrow, wide = (np.ptp(aim(one, 2.0).interval_90) for one in (sure, unsure))
     assert wide > 3 * narrow
     assert aim(sure, 2.0).warnings == ()
-    told = aim(unsure, 2.0).warnings
-    assert "has not converged" in told[0] and "its recordings by 20.0 % at most" in told[1]
+    summary = aim(unsure, 2.0).warnings
+    assert "has not converged" in summary[0] and "its recordings by 20.0 % at most" in summary[1]
     assert "no samples" in aimed.warnings[0]
 
 
@@ -85,8 +85,8 @@ def test_a_runs_policy_is_asked_as_the_command_asks_it(world, tmp_path) -> None:
     np.testing.assert_allclose(found.draw, policy.draws(np.array([2.0]))[0])
     assert not any("another θ" in one for one in found.warnings)
     put_card(policy.folder, {"youngs_modulus": 1.0})
-    told = aim(Identification(**about, policy=policy), 2.0).warnings
-    assert any("another θ" in one for one in told)
+    summary = aim(Identification(**about, policy=policy), 2.0).warnings
+    assert any("another θ" in one for one in summary)
 
 
 def put_card(folder, theta: dict) -> None:

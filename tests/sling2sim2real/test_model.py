@@ -36,8 +36,8 @@ def test_launches_are_those_of_a_run_with_the_same_theta_file(world, tmp_path, s
 
 
 def test_launch_settings_go_before_the_recordings_history(world) -> None:
-    asked = Settings.coarse(launch={"pause": 5.0})
-    model = replace(world, history=HISTORY, settings=asked)
+    requested = Settings.coarse(launch={"pause": 5.0})
+    model = replace(world, history=HISTORY, settings=requested)
     assert model.launch_setup.history == replace(HISTORY, pause=5.0)
     assert world.launch_setup.history is None
     neo = Theta(2.2e5, 0.47, 2.4e-3, 0.7, 0.6)
@@ -73,8 +73,8 @@ def test_theta_is_read_as_it_is_written(tmp_path, rubber) -> None:
         ({"returned_share": 0.0}, "returned_share: must be between"),
     ],
 )
-def test_a_theta_that_cannot_be(values: dict, said: str) -> None:
-    with pytest.raises(UserError, match=said):
+def test_a_theta_that_cannot_be(values: dict, message: str) -> None:
+    with pytest.raises(UserError, match=message):
         replace(Theta(2e5, 0.47, 2.4e-3, 0.7, 0.6), **values)
 
 
@@ -87,16 +87,16 @@ def test_a_theta_that_cannot_be(values: dict, said: str) -> None:
         ((0.023, 0.010, None), "Band: rest_length"),
     ],
 )
-def test_a_size_that_no_band_has_is_refused_at_once(sizes, said: str) -> None:
-    with pytest.raises(UserError, match=said) as refusal:
+def test_a_size_that_no_band_has_is_refused_at_once(sizes, message: str) -> None:
+    with pytest.raises(UserError, match=message) as refusal:
         Band(*sizes)
     assert "\n" not in str(refusal.value)
 
 
 def test_a_band_that_does_not_fit_the_lab(world) -> None:
-    for wrong, said in (
+    for wrong, message in (
         (Band(0.023, 0.010, 0.20), "rest_length"),
         (Band(0.023, 0.010, 0.52, name="my band"), "a name has at most"),
     ):
-        with pytest.raises(UserError, match=said):
+        with pytest.raises(UserError, match=message):
             Model(wrong, world.theta)

@@ -56,8 +56,8 @@ def test_what_no_simulation_can_follow_is_infinite(world, episode) -> None:
     ("points", "said"),
     [(np.zeros(5), r"must have shape \(N, 5\)"), (np.full((1, 5), 1.5), "in the unit cube")],
 )
-def test_wrong_points(world, episode, points, said: str) -> None:
-    with pytest.raises(UserError, match=said):
+def test_wrong_points(world, episode, points, message: str) -> None:
+    with pytest.raises(UserError, match=message):
         Objective(world, [episode])(points)
 
 

@@ -29,7 +29,7 @@ def test_the_defaults_are_a_link_to_the_projects() -> None:
 
 
 def test_it_needs_no_file_in_the_working_folder(tmp_path) -> None:
-    assert asked(str(ROOT), tmp_path)[0] == str(ROOT / "sling2sim2real" / "__init__.py")
+    assert requested(str(ROOT), tmp_path)[0] == str(ROOT / "sling2sim2real" / "__init__.py")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -46,12 +46,12 @@ def test_a_wheel_has_all_that_it_needs(tmp_path) -> None:
         file.extractall(installed)
     work = tmp_path / "work"
     work.mkdir()
-    where, landing = asked(str(installed), work)
+    where, landing = requested(str(installed), work)
     assert where.startswith(str(installed))
-    assert landing == asked(str(source), work)[1]
+    assert landing == requested(str(source), work)[1]
 
 
-def asked(place: str, folder) -> list[str]:
+def requested(place: str, folder) -> list[str]:
     """What ASK prints in `folder`, with the package that lies in `place`."""
     known = {**os.environ, "PYTHONPATH": place}
     about = {"cwd": folder, "env": known, "capture_output": True, "text": True, "timeout": 240}

@@ -52,6 +52,6 @@ def test_a_file_of_ones_own(tmp_path) -> None:
         ({"stup": {}}, "settings: stup: unknown key"),
     ],
 )
-def test_wrong_values_are_refused_by_name(changes: dict, said: str) -> None:
-    with pytest.raises(UserError, match=said):
+def test_wrong_values_are_refused_by_name(changes: dict, message: str) -> None:
+    with pytest.raises(UserError, match=message):
         Settings.default(**changes)

@@ -36,9 +36,11 @@ def test_each_pull_of_each_file_becomes_an_episode_in_order(folder, seen, blind,
     about = [(one["file"], one["pull"]) for one in found]
     assert about == [("a.mcap", 1), ("a.mcap", 3), ("b.mcap", 1)]
     assert not left.exists()
-    said = capsys.readouterr()
-    assert said.err.startswith("warning: left out: data/raw/band1/a.mcap: pull 2 of 3: empty mask")
-    assert said.err.count("\n") == 1 and said.out.count("peak force") == 3
+    message = capsys.readouterr()
+    assert message.err.startswith(
+        "warning: left out: data/raw/band1/a.mcap: pull 2 of 3: empty mask"
+    )
+    assert message.err.count("\n") == 1 and message.out.count("peak force") == 3
 
 
 def test_a_split_bag_becomes_one_episode(folder, seen) -> None:

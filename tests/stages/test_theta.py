@@ -46,7 +46,7 @@ def test_what_a_method_leaves_out_is_left_out_everywhere(
     found = load_theta(path, "band1")
     assert json.loads(path.read_text()).get("mounted") == (None if mounting else False)
     assert (calibrated(params, "band1", found).flexural_rigidity == 2e-3) == mounting
-    told = Identification.of_run("band1", "sling2sim2real")
-    assert (told.mounting is not None) == mounting
+    summary = Identification.of_run("band1", "sling2sim2real")
+    assert (summary.mounting is not None) == mounting
     folders = {folder.name for folder in Path(".checkpoints").iterdir()}
     assert folders == {"band1" if mounting else "band1-unmounted"}

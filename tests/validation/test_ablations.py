@@ -41,8 +41,8 @@ def test_pairs_are_compared_by_signed_ranks() -> None:
 
 def test_an_interval_holds_the_mean_as_often_as_it_says() -> None:
     rng = np.random.default_rng(3)
-    told = [mean_interval(rng.normal(size=40)) for _ in range(200)]
-    inside = np.mean([one["low"] < 0 < one["high"] for one in told])
+    confidence = [mean_interval(rng.normal(size=40)) for _ in range(200)]
+    inside = np.mean([one["low"] < 0 < one["high"] for one in confidence])
     assert 0.88 < inside < 0.99
     assert mean_interval([np.nan])["mean"] is None
 
@@ -51,11 +51,11 @@ def spent(optimizer, rollouts: int) -> tuple[np.ndarray, list[tuple[str, int]]]:
     """All points of a search of a tilted bowl, and its batches' phases and sizes."""
     points, batches = [], []
     while rollouts > 0:
-        asked = optimizer.ask()
-        batches.append((optimizer.phase, len(asked)))
-        optimizer.tell(bowl(asked))
-        points.append(asked)
-        rollouts -= len(asked)
+        requested = optimizer.ask()
+        batches.append((optimizer.phase, len(requested)))
+        optimizer.tell(bowl(requested))
+        points.append(requested)
+        rollouts -= len(requested)
     return np.concatenate(points), batches
 
 

@@ -76,13 +76,13 @@ def test_what_failed_or_missed_is_counted_and_takes_no_part() -> None:
     assert (other["runs"], other["failed"], other["miss"]["n"]) == (4, 1, 2)
     assert other["youngs_modulus"]["n"] == 3
     assert np.isclose(other["miss_change"]["mean"], 0.02)
-    told = ["mine: 4 a row.", "mine, `other`: 1 of 4 found no θ."]
-    assert runs(figures, ROWS, {"m": "mine"}) == told
+    summary = ["mine: 4 a row.", "mine, `other`: 1 of 4 found no θ."]
+    assert runs(figures, ROWS, {"m": "mine"}) == summary
 
 
 def test_a_setting_of_which_nothing_is_known_has_no_figure() -> None:
     failed = [{key: one[key] for key in KEY} | {"failed": "why"} for one in all_of("other")[:1]]
     figures = effects(all_of(AS_IS) + failed, [AS_IS, "other"], ["m"], BANDS)
     assert table(figures, ROWS, {"m": "mine"})[-1] == "| `other` | rig | no θ | no θ | no θ |"
-    told = ["mine: 4 a row, 1 `other`.", "mine, `other`: 1 of 1 found no θ."]
-    assert runs(figures, ROWS, {"m": "mine"}) == told
+    summary = ["mine: 4 a row, 1 `other`.", "mine, `other`: 1 of 1 found no θ."]
+    assert runs(figures, ROWS, {"m": "mine"}) == summary

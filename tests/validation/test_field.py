@@ -11,7 +11,7 @@ from validation.recordings.streams import FORCE, POSE, Bag
 __all__ = ["blind"]
 
 
-def told(modulus: float, damping: float, width: float = 0.05) -> dict:
+def summary(modulus: float, damping: float, width: float = 0.05) -> dict:
     return {
         name: [value, value * (1 - width), value * (1 + width)]
         for name, value in (("modulus", modulus), ("damping", damping))
@@ -19,11 +19,11 @@ def told(modulus: float, damping: float, width: float = 0.05) -> dict:
 
 
 def test_a_value_is_right_within_its_limits_and_interval() -> None:
-    sound = told(2e5, 2e-3)
-    assert is_right(sound, told(2.04e5, 2.05e-3))
-    assert not is_right(sound, told(2.06e5, 2e-3))  # 3 %
-    assert not is_right(sound, told(2.02e5, 2e-3, width=0.005))  # sure of another value
-    assert not is_right(sound, told(2e5, 4e-3, width=0.9))
+    sound = summary(2e5, 2e-3)
+    assert is_right(sound, summary(2.04e5, 2.05e-3))
+    assert not is_right(sound, summary(2.06e5, 2e-3))  # 3 %
+    assert not is_right(sound, summary(2.02e5, 2e-3, width=0.005))  # sure of another value
+    assert not is_right(sound, summary(2e5, 4e-3, width=0.9))
 
 
 def test_a_bag_is_written_as_it_was_read(blind, tmp_path) -> None:
@@ -70,5 +70,5 @@ def test_the_table_counts_by_class() -> None:
         {"fault": "saturated", "outcome": "refused"},
     ]
     family = field._family(results, "force")
-    said = block({"families": {"force": family}, "false_alarms": [], "sound_recordings": 3})
-    assert "| force | 3 | 1 | 1 | 0 | 1 | 4.0 %, 2 times |" in said
+    message = block({"families": {"force": family}, "false_alarms": [], "sound_recordings": 3})
+    assert "| force | 3 | 1 | 1 | 0 | 1 | 4.0 %, 2 times |" in message

@@ -149,8 +149,8 @@ def test_a_users_mistake(project: Path) -> None:
 
 
 def test_the_command_lists_each_committed_file() -> None:
-    asked = ["git", "ls-files", "reports/*.json"]
-    names = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    requested = ["git", "ls-files", "reports/*.json"]
+    names = subprocess.run(requested, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     done = python("-m", "app", "figures", "--json", folder=ROOT)
-    told = {one["file"] for one in json.loads(done.stdout)["figures"]}
-    assert {*names.split()} <= told and len(told) > 20
+    summary = {one["file"] for one in json.loads(done.stdout)["figures"]}
+    assert {*names.split()} <= summary and len(summary) > 20

@@ -148,8 +148,10 @@ def test_a_small_disk_is_filled_to_the_bytes_that_are_to_stay_free(disk: Path) -
 
 def test_a_command_that_is_quiet_about_a_full_disk_is_a_fault(disk: Path, monkeypatch) -> None:
     monkeypatch.setattr(full_disk, "MEAN", 0.0)
-    said = full_disk.filled(Sleeper(disk.parent, 0, write=True), 0, 1, True)
-    assert said["status"] == 0 and said["full_after_s"] is not None  # its child's failure is lost
+    message = full_disk.filled(Sleeper(disk.parent, 0, write=True), 0, 1, True)
+    assert (
+        message["status"] == 0 and message["full_after_s"] is not None
+    )  # its child's failure is lost
     quiet = Sleeper(disk.parent)
     quiet.code = "raise SystemExit(1)"
     assert "status 1" in full_disk.filled(quiet, 0, 1, True)["faults"][0]
@@ -174,11 +176,11 @@ def test_disturbing_goes_on_where_it_was_and_ends_well(tmp_path: Path, monkeypat
 
     (tmp_path / "tmp").mkdir()
     monkeypatch.setattr(campaign, "ended", lambda *_: dict.fromkeys(campaign.CHECKS, True))
-    file, asked = tmp_path / "results.jsonl", []
+    file, requested = tmp_path / "results.jsonl", []
 
     def attempt(number: int, most: int) -> dict:
-        asked.append((number, most))
-        if len(asked) == 3:
+        requested.append((number, most))
+        if len(requested) == 3:
             raise KeyboardInterrupt
         kills = [{"hit": "flow", "sent_to": "process", "after_s": 1.0}] * min(most, 2)
         return {"status": 9 if kills else 0, "kills": kills, "seconds": 1.0, "faults": []}
@@ -189,11 +191,11 @@ def test_disturbing_goes_on_where_it_was_and_ends_well(tmp_path: Path, monkeypat
     with file.open("a") as cut:
         cut.write('{"what": "att')
     disturb(copy, "kill", 5, ResultLines(file), EXPECTED["sling flow"], attempt)
-    assert asked == [(0, 5), (1, 3), (2, 1), (2, 1), (3, 0)] and copy.begun == 1
+    assert requested == [(0, 5), (1, 3), (2, 1), (2, 1), (3, 0)] and copy.begun == 1
     lines = ResultLines(file)
     disturb(copy, "kill", 5, lines, EXPECTED["sling flow"], attempt)  # all is done
     assert (
-        len(asked) == 5
+        len(requested) == 5
         and lines.where(what="round", name="sling flow", by="kill")[-1]["after"] == 5
     )
     names = ["sling flow"]
@@ -219,8 +221,10 @@ def test_the_docs_say_what_was_counted() -> None:
     found = json.loads((ROOT / "reports/validation/kills.json").read_text(encoding="utf-8"))
     counts = found["figures"]
     page = " ".join((ROOT / "docs/flow.md").read_text(encoding="utf-8").split())
-    said = f"{counts['kills']} kills at random moments over `dvc repro`, `sling flow`, `sling fit`"
-    assert said in page and f"and {counts['full_disks']} disks that became full" in page
+    message = (
+        f"{counts['kills']} kills at random moments over `dvc repro`, `sling flow`, `sling fit`"
+    )
+    assert message in page and f"and {counts['full_disks']} disks that became full" in page
     assert all(one[check] for one in counts["rounds"] for check in CAME_OUT)
     assert all("Prefect's server does not start" in one["fault"] for one in counts["faults"])
     left = [one for one in counts["rounds"] if not (one["no_temporaries"] and one["no_locks"])]

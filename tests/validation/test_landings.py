@@ -61,9 +61,9 @@ def test_figures_are_means_over_bands() -> None:
         )
     ]
     lines.append(JOB | {"band": "a", "number": 1, "failed": "no band"})
-    (told,) = figures(lines).values()
-    assert told["settled"] == [1, 2] and told["refused"] == {"a 1": "no band"}
-    about = told["together"]
+    (summary,) = figures(lines).values()
+    assert summary["settled"] == [1, 2] and summary["refused"] == {"a 1": "no band"}
+    about = summary["together"]
     assert about["mean_size_of_bias"] == pytest.approx(0.03)
     assert about["worst_bias"] == pytest.approx(0.04)
     assert (about["coverage"], about["least_coverage"]) == (0.5, 0.0)

@@ -108,7 +108,7 @@ ABOUT = {
 }
 
 
-def told(ours: list, paper: list = (1.5, 2.0), **more) -> dict:
+def summary(ours: list, paper: list = (1.5, 2.0), **more) -> dict:
     """A machine's JSON with landings."""
     about = {"theta": {"youngs_modulus": 2e5}, "loss": 0.4, "seconds": 1.0}
     methods = {OURS: about | {"landing": ours}, PAPER: about | {"landing": list(paper)}}
@@ -126,24 +126,24 @@ def command(folder: Path, monkeypatch, *contents: dict) -> int:
 def test_our_landings_may_differ_by_a_limit_and_the_papers_by_anything(
     tmp_path, monkeypatch, capsys
 ) -> None:
-    near = told(
+    near = summary(
         [1.5 * (1 + 0.9 * LIMIT), 2.0],
         [1.8, 2.0],
         code=ABOUT["code"] | {"validation/campaigns": "b"},
     )
-    assert command(tmp_path, monkeypatch, told([1.5, 2.0]), near) == 0
+    assert command(tmp_path, monkeypatch, summary([1.5, 2.0]), near) == 0
     out = capsys.readouterr().out
     assert f"{OURS}: landings of any two differ by 0.18 % at most; within 0.2 %" in out
     assert f"{PAPER}: by 20 % at most" in out
-    far = told([1.5, 2.0 * (1 - 1.1 * LIMIT)])
-    assert command(tmp_path, monkeypatch, told([1.5, 2.0]), near, far) == 1
+    far = summary([1.5, 2.0 * (1 - 1.1 * LIMIT)])
+    assert command(tmp_path, monkeypatch, summary([1.5, 2.0]), near, far) == 1
     assert "MORE than 0.2 %" in capsys.readouterr().out
 
 
 def test_a_launch_that_fails_on_one_machine_alone_is_a_difference(tmp_path, monkeypatch) -> None:
-    both = told([1.5, None])
+    both = summary([1.5, None])
     assert command(tmp_path, monkeypatch, both, both) == 0
-    assert command(tmp_path, monkeypatch, both, told([1.5, 2.0])) == 1
+    assert command(tmp_path, monkeypatch, both, summary([1.5, 2.0])) == 1
 
 
 @pytest.mark.parametrize(
@@ -152,9 +152,9 @@ def test_a_launch_that_fails_on_one_machine_alone_is_a_difference(tmp_path, monk
 )
 def test_what_is_not_of_the_same_is_not_compared(tmp_path, monkeypatch, what, value) -> None:
     with pytest.raises(UserError, match=f"0 and 1: of different {what}"):
-        command(tmp_path, monkeypatch, told([1.5, 2.0]), told([1.5, 2.0], **{what: value}))
+        command(tmp_path, monkeypatch, summary([1.5, 2.0]), summary([1.5, 2.0], **{what: value}))
     with pytest.raises(UserError, match="two machines at least"):
-        command(tmp_path, monkeypatch, told([1.5, 2.0]))
+        command(tmp_path, monkeypatch, summary([1.5, 2.0]))
 
 
 @pytest.fixture

@@ -30,8 +30,8 @@ def test_the_first_mutations_of_each_family(tmp_path) -> None:
     assert len({mutations.key(one) for one in results}) == len(results) == EACH * len(CELLS)
     assert mutations.faults(results) == []
     assert {*SORTS} <= {one["outcome"] for one in results}  # the damage was not all of one sort
-    told = mutations.summary(results, len(results))
-    assert told["met"] and told["figures"]["recordings"] == len(results)
+    on_result = mutations.summary(results, len(results))
+    assert on_result["met"] and on_result["figures"]["recordings"] == len(results)
     assert not mutations.summary(results, len(results) + 1)["met"]
 
 
@@ -54,7 +54,7 @@ def outcome(whole, monkeypatch, result, checked: bool = True) -> tuple[str, str]
 
     monkeypatch.setattr(outcomes, "process", processed)
     monkeypatch.setattr(outcomes, "episode_of", lambda *_: result)
-    return outcomes.outcome(path, params, episode, outcomes.said(done), checked)
+    return outcomes.outcome(path, params, episode, outcomes.message(done), checked)
 
 
 def test_what_counts_as_a_fault(whole, monkeypatch) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validation.ranks import part_below, told
+from validation.ranks import part_below, summary
 
 EPISODES, SAMPLES, NOISE = 400, 100, 0.5
 
@@ -22,7 +22,7 @@ def ranks(width: float = 1.0, shift: float = 0.0) -> dict:
     spread = precision**-0.5
     mean = seen * NOISE**-2 / precision + shift * spread
     samples = mean + width * spread * rng.normal(0, 1, (SAMPLES, EPISODES))
-    return told(part_below(samples, truth))
+    return summary(part_below(samples, truth))
 
 
 def test_a_right_posterior_has_even_ranks() -> None:

@@ -41,7 +41,7 @@ def bench(arguments: argparse.Namespace, what: str) -> str:
     return json.dumps(environment(device, command, script) | result)
 
 
-def asked(arguments: argparse.Namespace) -> str:
+def requested(arguments: argparse.Namespace) -> str:
     """The benchmark asked for, a key of TAKES. Raises ArgumentTypeError on a flag too many."""
     flags = ("recording", "scaling", "peers", "methods", "budget", "law", "device")
     given = [name for name in flags if getattr(arguments, name) is not None]

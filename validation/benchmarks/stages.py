@@ -69,8 +69,8 @@ class Project:
         )
         after = getrusage(RUSAGE_CHILDREN)
         if done.returncode:
-            said = (done.stderr or done.stdout).strip().splitlines() or [""]
-            raise UserError(f"{self.folder}: {' '.join(words)}: {errors.one_line(said[-1])}")
+            message = (done.stderr or done.stdout).strip().splitlines() or [""]
+            raise UserError(f"{self.folder}: {' '.join(words)}: {errors.one_line(message[-1])}")
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done
 
     def python(self, *words: str, given: str = "") -> float:
@@ -97,8 +97,8 @@ def profile(project: Project, steps: Sequence[str]) -> dict[str, dict]:
     for step in steps or known:
         name, command = known[step]
         words = ["/bin/sh", "-c", command]
-        _, said = project.cpu(words, PYTHONPROFILEIMPORTTIME="1")  # which takes its own time
-        modules = list(dict.fromkeys(IMPORT.findall(said.stderr)))
+        _, message = project.cpu(words, PYTHONPROFILEIMPORTTIME="1")  # which takes its own time
+        modules = list(dict.fromkeys(IMPORT.findall(message.stderr)))
         whole, imports = (
             project.cpu(words)[0],
             project.python("-c", IMPORTS, given=" ".join(modules)),

@@ -150,22 +150,25 @@ def seconds_of_fit(folder: Path) -> dict[str, int]:
 
 def perform(step: MeasuredStep, done: dict[str, dict], folder: Path) -> dict:
     """What a step's file in `folder` says; measured now where it is not there or failed."""
-    kept, log = folder / f"{step.name}.json", folder / f"{step.name}.log"
-    if kept.is_file() and (result := json.loads(kept.read_text(encoding="utf-8")))["ok"]:
+    result_file, log = folder / f"{step.name}.json", folder / f"{step.name}.log"
+    if (
+        result_file.is_file()
+        and (result := json.loads(result_file.read_text(encoding="utf-8")))["ok"]
+    ):
         return result
     if step.needs and not done[step.needs].get("ok"):
         return {"ok": False, "why": f"needs {step.needs}"}
     clone = folder / "project"
     result = measured(step.command, clone, surroundings(folder), log)
-    said = log.read_text(encoding="utf-8", errors="replace")
-    result["ok"] = result["status"] == 0 and bool(re.search(step.says, said))
+    message = log.read_text(encoding="utf-8", errors="replace")
+    result["ok"] = result["status"] == 0 and bool(re.search(step.says, message))
     if not result["ok"]:
-        last = (said.strip().splitlines() or [""])[-1]
+        last = (message.strip().splitlines() or [""])[-1]
         result["why"] = f"status {result['status']}: {errors.one_line(last)[:200]}"
     result["disk_bytes"] = {name: disk(clone / name) for name in step.makes}
-    if found := seconds_of_stages(said):
+    if found := seconds_of_stages(message):
         result["stages"] = found
-    write_json(kept, result)
+    write_json(result_file, result)
     return result
 
 
@@ -240,8 +243,8 @@ def times(
             done[step.name].pop("status", None)
         done[step.name] |= {"what": step.what}
         one = done[step.name]
-        told = one.get("why") or one.get("skipped") or f"{one['seconds']:.0f} s"
-        print(f"{step.name}: {told}", file=sys.stderr, flush=True)
+        summary = one.get("why") or one.get("skipped") or f"{one['seconds']:.0f} s"
+        print(f"{step.name}: {summary}", file=sys.stderr, flush=True)
     scripts = [clone / "app/cli.py", *sorted((clone / "stages").glob("[a-z]*.py"))]
     report = environment("cpu", command) | {
         "about": "Each step in one fresh clone with a new .venv and caches of its own. Memory is"

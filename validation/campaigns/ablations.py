@@ -104,7 +104,7 @@ def aimed_and_launched(job: Job, params: Params, folder: Path) -> dict:
     draws = aimed(one.outcome, params, params.trials.targets)
     return {
         "theta": one.theta,
-        "loss": one.told.get("loss"),
+        "loss": one.confidence.get("loss"),
         "draws_m": draws,
         "error_m": errors_on_the_rig(job.band, params, draws),
         "seconds": one.seconds,
@@ -243,7 +243,7 @@ def report(args: argparse.Namespace, params: Params) -> None:
         },
         "jobs": len(wanted),
         "done": len(results),
-        "processors": dict(Counter(one.get("processor", "not told") for one in results)),
+        "processors": dict(Counter(one.get("processor", "unknown") for one in results)),
         "rank_correlation_of_loss_and_miss": {
             "methods": same,
             "over_recordings": mean_interval(rank_correlations(results, same)),

@@ -96,15 +96,17 @@ def figures(lines: list[dict]) -> dict:
     """By what the camera's clock is held against: errors [s], and how true those stated are."""
     good, result = [one for one in lines if "failed" not in one], {}
     for name in ("pose", "release", "force"):
-        off, said = (np.array([one[part][name] for one in good]) for part in ("off", "stated"))
-        rms, told = np.sqrt(np.mean(off**2)), np.sqrt(np.mean(said**2))
+        off, stated_errors = (
+            np.array([one[part][name] for one in good]) for part in ("off", "stated")
+        )
+        rms, stated_rms = np.sqrt(np.mean(off**2)), np.sqrt(np.mean(stated_errors**2))
         result[name] = {
             "rms": rms,
             "mean": off.mean(),
             "worst": np.abs(off).max(),
-            "stated_rms": told,
-            "stated_over_rms": told / rms,
-            "met": bool(rms <= MOST and 1 / FACTOR <= told / rms <= FACTOR),
+            "stated_rms": stated_rms,
+            "stated_over_rms": stated_rms / rms,
+            "met": bool(rms <= MOST and 1 / FACTOR <= stated_rms / rms <= FACTOR),
         }
     return result
 

@@ -35,7 +35,7 @@ from validation.projects import SLING, TINY, ProjectCopy, copy_project, run_of
 
 WORK, REPORT = Path("build/conditions"), Path("reports/validation/conditions.json")
 LIMIT = 900.0  # s for a command
-TOLD = 600  # characters of what a command said
+RELEASE_ERROR = 600  # characters of what a command said
 USER = 1234  # who has no name and owns nothing
 # What only it may do is read: Python itself may lie where only root looks.
 AS_USER = (
@@ -69,7 +69,7 @@ REFUSED = {  # conditions in which one command cannot do what it is for
     ("project of another user", "reset"),  # Git gives nothing of another user's
     ("port in use", "ui"),
     ("no git", "reset"),
-    ("no git", "dvc repro"),  # DVC itself wants Git, or to be told
+    ("no git", "dvc repro"),  # DVC itself wants Git, or to know
 }
 ROOTS = (
     "read only project",
@@ -251,11 +251,12 @@ def run(cell: Cell, work: Path) -> Result:
     at, log = Place(folder, folder / "copy", own, port), work / f"{folder.name}.txt"
     CONDITIONS[cell.condition](at)
     start = time.monotonic()
-    with at.held, log.open("w") as said:
+    with at.held, log.open("w") as message:
         command = [*at.prefix, *words_of(cell, at.port)]
         process = subprocess.Popen(
             command, cwd=at.copy, env=at.environment | {"PWD": str(at.copy)},
-            stdin=subprocess.DEVNULL, stdout=said, stderr=subprocess.STDOUT, start_new_session=True,
+            stdin=subprocess.DEVNULL, stdout=message, stderr=subprocess.STDOUT,
+            start_new_session=True,
         )  # fmt: skip
         status = ended(process, log)
     text = log.read_text(encoding="utf-8", errors="replace")
@@ -266,8 +267,8 @@ def run(cell: Cell, work: Path) -> Result:
         shutil.rmtree(folder)
     lines = [line for line in text.splitlines() if line.lower().startswith("error: ")]
     seconds = round(time.monotonic() - start, 1)
-    told = [line.replace(str(folder), "...") for line in lines[-1:]]
-    return vars(cell) | {"status": status, "seconds": seconds, "said": told, "faults": faults}
+    summary = [line.replace(str(folder), "...") for line in lines[-1:]]
+    return vars(cell) | {"status": status, "seconds": seconds, "said": summary, "faults": faults}
 
 
 def ended(process: subprocess.Popen, log: Path) -> int | None:
@@ -290,13 +291,13 @@ def faults_of(cell: Cell, status: int | None, text: str) -> list[str]:
     lines = [line for line in text.splitlines() if line.lower().startswith("error: ")]
     faults = []
     if (status == 0) != expected(cell) or (status not in (0, 1) and cell.command != "dvc repro"):
-        faults.append(f"status {status}: {text[-TOLD:]}")
+        faults.append(f"status {status}: {text[-RELEASE_ERROR:]}")
     if "Traceback" in text:
-        faults.append(f"a traceback: {text[-TOLD:]}")
+        faults.append(f"a traceback: {text[-RELEASE_ERROR:]}")
     if expected(cell) and lines:
         faults.append(f"an error, and status 0: {lines[0]}")
     if not expected(cell) and len(lines) != 1 and cell.command != "dvc repro":
-        faults.append(f"{len(lines)} lines of error: {text[-TOLD:]}")
+        faults.append(f"{len(lines)} lines of error: {text[-RELEASE_ERROR:]}")
     return faults
 
 
@@ -304,8 +305,10 @@ def changes(copy: Path) -> str:
     """What Git sees, in a line; nothing where there is no Git."""
     if not (copy / ".git").is_dir():
         return ""
-    asked = ["git", "-c", "safe.directory=*", "status", "--porcelain"]
-    return " ".join(subprocess.run(asked, cwd=copy, capture_output=True, text=True).stdout.split())
+    requested = ["git", "-c", "safe.directory=*", "status", "--porcelain"]
+    return " ".join(
+        subprocess.run(requested, cwd=copy, capture_output=True, text=True).stdout.split()
+    )
 
 
 def report(results: list[Result]) -> dict:

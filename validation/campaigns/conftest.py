@@ -43,7 +43,7 @@ def record(request) -> Callable[..., None]:
     def write(
         name: str,
         *,
-        asked: str,
+        requested: str,
         met: bool,
         settings: dict,
         figures: dict,
@@ -53,7 +53,13 @@ def record(request) -> Callable[..., None]:
             "alone": "python -m pytest -m validation -n 0"
             f" validation/campaigns/{request.path.name}",
         }
-        content = {"asked": asked, "met": met, "settings": settings, "figures": figures, **about}
+        content = {
+            "asked": requested,
+            "met": met,
+            "settings": settings,
+            "figures": figures,
+            **about,
+        }
         write_json(ROOT / "reports/validation" / f"{name}.json", plain(content, digits=5))
 
     return write

@@ -122,7 +122,7 @@ def scored(case: Case, work: Path, recordings: Path | None) -> dict:
     one = identified(params, case.band, case.method, case.seed, case.episode(work))
     about = {"theta": one.theta, "youngs_modulus": one.theta["youngs_modulus"]}
     about |= {"seconds": one.seconds, "point": [*one.outcome.identified.values()]}
-    about |= {"own_loss": one.told.get("loss", {}).get("total")}
+    about |= {"own_loss": one.summary.get("loss", {}).get("total")}
     seen = Episode.load(case.episode(work, AS_IS) / "episode")
     about |= forces(case.band, one.outcome, seen)
     return about | misses(case.band, one.outcome, seen, recordings)
@@ -185,7 +185,7 @@ def block(content: dict) -> str:
     """What docs/paper.md has between its marks, of a report's content."""
     (begin, end), figures = marks(BLOCK), content["figures"]
     seeds, number = content["settings"]["search_seeds"], content["settings"]["recordings"]
-    told = [
+    summary = [
         f"Recordings of each band: {number}. Search seeds: {seeds[PAPER]} of the paper's method,"
         " one of ours. Identifications:",
         *runs(figures, WORDS, METHODS),
@@ -195,20 +195,22 @@ def block(content: dict) -> str:
         bands = ", ".join(
             band for band, own in (one.split(", ") for one in refusals) if own == setting
         )
-        told.append(f"With `{setting}` no clamps can be calibrated ({bands}): the default's serve.")
-    lines = [*table(figures, WORDS, METHODS), "", " ".join(told)]
+        summary.append(
+            f"With `{setting}` no clamps can be calibrated ({bands}): the default's serve."
+        )
+    lines = [*table(figures, WORDS, METHODS), "", " ".join(summary)]
     return begin + "\n".join(lines) + "\n" + end
 
 
 def refused(args: argparse.Namespace) -> dict:
     """Why a recording's clamps were not calibrated under a setting, so that others' were taken."""
-    told = {}
+    summary = {}
     for band in args.bands:
         for switch in EPISODES_ANEW:
             path = place(args.work, band, 0, switch) / "mounting.json"
             reason = json.loads(path.read_text()).get("refused") if path.exists() else None
-            told |= {f"{band}, {switch}": reason} if reason else {}
-    return told
+            summary |= {f"{band}, {switch}": reason} if reason else {}
+    return summary
 
 
 def main() -> None:

@@ -117,7 +117,7 @@ def identified(episode: s2s.Episode, recording: str, start: s2s.Model | None) ->
     return s2s.identify([episode], band, settings=settings, start=start)
 
 
-def told(found: s2s.Identification) -> dict:
+def summary(found: s2s.Identification) -> dict:
     """E [Pa] and s·d [s] with their intervals, and whether the fit converged."""
     names = {"modulus": "youngs_modulus", "damping": "damping_product"}
     values = {key: found.intervals[name] for key, name in names.items()}
@@ -162,10 +162,10 @@ def tried(case: Faulty, work: Path, folder: Path | None) -> dict:
         return {"findings": found, "outcome": CAUTIONED}
     sound = start_of(case.recording, None, work, folder)
     try:
-        values = told(identified(episode, case.recording, sound))
+        values = summary(identified(episode, case.recording, sound))
     except UserError as error:
         return {"findings": found, "outcome": REFUSED, "identification": str(error)}
-    right = is_right(told(sound), values)
+    right = is_right(summary(sound), values)
     outcome = CORRECT if right else MISNAMED if found else SILENT
     return {"findings": found, "outcome": outcome, "values": values} | errors_of(sound, values)
 
@@ -179,7 +179,7 @@ def is_right(sound: dict, values: dict) -> bool:
 
 
 def errors_of(sound: s2s.Identification, values: dict) -> dict:
-    right = told(sound)
+    right = summary(sound)
     return {
         "modulus_error": values["modulus"][0] / right["modulus"][0] - 1,
         "damping_factor": values["damping"][0] / right["damping"][0],
@@ -237,7 +237,7 @@ def _counts(results: list[dict]) -> dict[str, int]:
 
 
 def _family(results: list[dict], family: str) -> dict:
-    """Counts of a class, and the largest errors that nothing of its concern told of."""
+    """Counts of a class, and the largest errors that nothing of its concern reported."""
     own = [one for one in results if FAULTS[str(one["fault"])].family == family]
     passed = [one for one in own if "modulus_error" in one]
     factors = [max(one["damping_factor"], 1 / one["damping_factor"]) for one in passed]

@@ -141,11 +141,13 @@ def identified(job: OneRecording, work: Path, keep: bool = False) -> dict:
         scores = scored(outcome, params, world, seed=job.number)
     if not keep:
         shutil.rmtree(folder)
-    kept = {name: confidence.get(name) for name in ("parameters", "derived", "settled", "steps")}
+    reported = {
+        name: confidence.get(name) for name in ("parameters", "derived", "settled", "steps")
+    }
     return plain(
         {
             "scores": scores,
-            "told": kept,
+            "told": reported,
             "delays": episode.metadata["preprocessing"].get("delays"),
             "identification_s": seconds,
             "cpu_s": time.process_time() - begin,

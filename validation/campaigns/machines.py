@@ -74,7 +74,7 @@ class MachineReport(JsonRecord):
 
 
 def inputs(params: Params, band: str, root: Path) -> str:
-    """A digest of all that a band's identification hangs on but the code. Raises NotMade."""
+    """A digest of all that a band's identification depends on but the code. Raises NotMade."""
     layout = Layout(root)
     names = ("signals", "clouds")
     files = [layout.episode(band) / f"{name}.parquet" for name in names]
@@ -155,8 +155,8 @@ def compared(reports: dict[str, MachineReport]) -> tuple[list[str], bool]:
             f" {one.seconds:.0f} s |"
         )
     for band, method in product(bands, largest):
-        told = [one.bands[band][method] for one in reports.values()]
-        largest[method] = max(largest[method], apart(told))
+        summary = [one.bands[band][method] for one in reports.values()]
+        largest[method] = max(largest[method], apart(summary))
     met = largest[OURS] <= LIMIT
     lines += ["", f"{OURS}: landings of any two differ by {100 * largest[OURS]:.2g} % at most;"]
     lines[-1] += f" {'within' if met else 'MORE than'} {100 * LIMIT:g} %"
@@ -164,9 +164,9 @@ def compared(reports: dict[str, MachineReport]) -> tuple[list[str], bool]:
     return lines, met
 
 
-def apart(told: list[MachineLandings]) -> float:
+def apart(summary: list[MachineLandings]) -> float:
     """The largest relative difference of a landing; infinite where only some machines have it."""
-    landings = np.array([one.landing for one in told], float)  # None is NaN
+    landings = np.array([one.landing for one in summary], float)  # None is NaN
     lacks = np.isnan(landings)
     if (lacks.any(axis=0) != lacks.all(axis=0)).any():
         return np.inf

@@ -38,7 +38,7 @@ WORK, REPORT = Path("build/mutations"), Path("reports/validation/mutations.json"
 LIBRARIES = ("mcap", "mcap-ros2-support", "mcap-protobuf-support", "rosbags", "protobuf")
 LIBRARIES += ("foxglove-sdk", "zstandard", "lz4", "opencv-python-headless")
 SHARE = 250  # recordings a process: what one process held is known a share at a time
-TOLD = 500
+RELEASE_ERROR = 500
 
 
 def key(result: Result) -> tuple[str, str, int]:
@@ -68,7 +68,7 @@ def run(
     folder: Path,
     parts: list[tuple],
     workers: int,
-    told: Callable[[Result], None],
+    on_result: Callable[[Result], None],
     end: float = math.inf,
 ) -> None:
     """Run shares, each in a process of its own, and tell of each recording.
@@ -77,7 +77,7 @@ def run(
         folder: Where recordings are written.
         parts: Of `shares`.
         workers: Processes at once.
-        told: Called with each result, in threads.
+        on_result: Called with each result, in threads.
         end: When to stop, of time.monotonic() [s].
     """
     for family, container in {part[:2]: None for part in parts}:
@@ -88,7 +88,7 @@ def run(
 
     def work(part: tuple) -> None:
         for result in _results(folder, *part) if time.monotonic() < end else ():
-            told(result)
+            on_result(result)
             if time.monotonic() > end:
                 break
 
@@ -103,13 +103,13 @@ def _results(folder: Path, family: str, container: str, first: int, end: int) ->
     while first < end:
         command = [sys.executable, "-m", module, folder, family, container, first, end]
         line: Result = {}
-        with log.open("w") as said:
+        with log.open("w") as message:
             process = subprocess.Popen(
                 list(map(str, command)),
                 cwd=ROOT,
                 env={**os.environ, "OMP_NUM_THREADS": "1"},
                 stdout=subprocess.PIPE,
-                stderr=said,
+                stderr=message,
                 text=True,
             )
             try:
@@ -199,16 +199,16 @@ def main() -> None:
     start, before = time.monotonic(), len(lines.lines)
     print(f"{before} recordings are done, {sum(b - a for *_, a, b in parts)} are to do", flush=True)
 
-    def told(result: Result) -> None:
+    def on_result(result: Result) -> None:
         lines.add(result)
         if result["outcome"] == FAULT:
             print(json.dumps(result), flush=True)
-        if len(lines.lines) % TOLD == 0:
+        if len(lines.lines) % RELEASE_ERROR == 0:
             minutes = (time.monotonic() - start) / 60
             failed = len(faults([*lines.lines]))
             print(f"{len(lines.lines)}, {minutes:.1f} min: {failed} faults", flush=True)
 
-    run(lines.path.parent, parts, args.workers, told, start + 60 * args.minutes)
+    run(lines.path.parent, parts, args.workers, on_result, start + 60 * args.minutes)
     results = sorted(lines.lines, key=key)
     command = f"python -m validation.campaigns.mutations --count {args.count}"
     content = summary(results, args.count)

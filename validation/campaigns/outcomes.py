@@ -51,8 +51,8 @@ def same(a: Episode, b: Episode) -> bool:
     return events[0] == events[1] and all(np.array_equal(x, y) for x, y in clouds)
 
 
-def said(done: Processed) -> list[str]:
-    """Everything by which a user is told of damage."""
+def message(done: Processed) -> list[str]:
+    """Everything by which a user learns of damage."""
     words = [*done.pull.recording.losses, *done.pull.recording.notes]
     if done.clouds.damaged or done.clouds.unpaired:
         words.append(f"{done.clouds.damaged} pictures damaged, {done.clouds.unpaired} unpaired")
@@ -83,7 +83,7 @@ def outcome(
             FAULT,
             f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})",
         )
-    words = [one for one in said(done) if one not in usual]
+    words = [one for one in message(done) if one not in usual]
     if words:
         return SAID, "; ".join(words)
     if same(episode, whole):
@@ -97,7 +97,7 @@ def main(folder: Path, family: str, container: str, seeds: range) -> None:
     original = folder / f"{name}.mcap"
     content = original.read_bytes()
     done = process(original, params.bands["band1"], params)
-    whole, usual = episode_of(done, "band1", params), said(done)
+    whole, usual = episode_of(done, "band1", params), message(done)
     path = folder / f"{name}-{seeds.start}-damaged.mcap"
     faulthandler.enable()
     faulthandler.register(signal.SIGPROF, chain=True)

@@ -25,7 +25,7 @@ from validation.campaigns import runner
 from validation.campaigns.runner import OURS, ResultLines, plain, result_of
 from validation.own_law import ranked
 from validation.projects import DEFAULTS
-from validation.ranks import told
+from validation.ranks import summary
 
 WORK, REPORT = Path(".checkpoints/own-law"), Path("reports/validation/density-own-law.json")
 PULLS, EPISODES = ("informative", "paper"), 200
@@ -58,7 +58,7 @@ def figures(lines: list[dict]) -> dict:
         parts = {
             name: np.array([one["below"][name] for one in good], float) for name in good[0]["below"]
         }
-        ranks = {name: told(one[np.isfinite(one)]) for name, one in parts.items()}
+        ranks = {name: summary(one[np.isfinite(one)]) for name, one in parts.items()}
         result[pull] = {
             "episodes": len(good),
             "refused": [one["failed"] for one in some if "failed" in one],

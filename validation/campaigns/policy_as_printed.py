@@ -102,14 +102,14 @@ def result(lesson: Lesson, params: Params, work: Path, method: str) -> dict:
     code = [digest(ROOT / part) for part in TRAINING]
     stamp = fingerprint(json.dumps([about, params.trials.targets, code], sort_keys=True))
     lines = ResultLines(work / "results.jsonl")
-    kept = lines.of(Lesson).get(lesson, {})
-    if kept.get("stamp") != stamp:
+    retained = lines.of(Lesson).get(lesson, {})
+    if retained.get("stamp") != stamp:
         name = f"{lesson.band}-{lesson.switch}-{lesson.seed}"
         progress = Progress(name, params.policy.iterations, "iterations", every=10)
         found = taught(lesson, params, theta, progress)
-        kept = plain({"stamp": stamp, **vars(lesson), **found})
-        lines.add(kept)
-    return {key: value for key, value in kept.items() if key != "stamp"}
+        retained = plain({"stamp": stamp, **vars(lesson), **found})
+        lines.add(retained)
+    return {key: value for key, value in retained.items() if key != "stamp"}
 
 
 def summary(results: list[dict]) -> dict:
@@ -189,8 +189,8 @@ def write_report(
     }
     write_json(args.report, content)
     last = results[-1]
-    told = f"{last['band']} {last['switch']} {last['seed']}: {last['error_m']}"
-    print(f"{len(results)} of {wanted}, {told}", flush=True)
+    line = f"{last['band']} {last['switch']} {last['seed']}: {last['error_m']}"
+    print(f"{len(results)} of {wanted}, {line}", flush=True)
 
 
 if __name__ == "__main__":

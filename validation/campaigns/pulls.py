@@ -7,7 +7,7 @@ recording no method sees, one number of stretch stands for the whole band: two s
 law `rubber` with its softening free is fitted to the force of a pull, with the priors of the
 method and noise of its own in REPEATS recordings; then the energy that a band gives back which was
 recorded before, was drawn to one of DRAWS and is let go within FREE seconds is held against the
-rubber's. The viscosity is told. There are no pictures.
+rubber's. The viscosity is given. There are no pictures.
 """
 
 from __future__ import annotations
@@ -152,12 +152,13 @@ def judged(params: Params, name: str, pulls: dict[str, Sequence[Dip]]) -> dict:
     for pull, dips in pulls.items():
         way = scalar.pull(dips)
         force = scalar.force(rubber.scale * true_stress(rubber, scalar.band.drawn(way)), way)
-        errors_of, rests, told = [], [], {}
+        errors_of, rests, summary = [], [], {}
         for seed in range(REPEATS):
             noise = np.random.default_rng(seed).normal(0, NOISE, len(way[::every]))
-            scale, told, rest = fitted(scalar, way[::every], force[::every] + noise)
+            scale, summary, rest = fitted(scalar, way[::every], force[::every] + noise)
             energies = [
-                scale * told_energy(told, rubber.viscosity, scalar, draw, worst) for draw in DRAWS
+                scale * told_energy(summary, rubber.viscosity, scalar, draw, worst)
+                for draw in DRAWS
             ]
             errors_of.append(100 * (np.array(energies) / truth - 1))
             rests.append(rest)
@@ -166,7 +167,7 @@ def judged(params: Params, name: str, pulls: dict[str, Sequence[Dip]]) -> dict:
             "mean_abs_error_percent": round(float(np.mean(np.abs(errors_of))), 2),
             "scatter_percent": round(float(np.std(errors_of, axis=0).mean()), 2),
             "left_newton": round(float(np.mean(rests)), 4),
-            "softening": round(told["softening"], 3),
+            "softening": round(summary["softening"], 3),
         }
     return found
 
@@ -190,8 +191,8 @@ def main() -> None:
         design = design_of(name, params.rig.bands[name].peak_force)
         found[name] = judged(params, name, pulls)
         for pull, rows in found[name].items():
-            told = 100 * 1.645 * np.sqrt(design.variances(pulls[pull]).mean())
-            rows["expected_half_width_percent"] = round(float(told), 2)
+            summary = 100 * 1.645 * np.sqrt(design.variances(pulls[pull]).mean())
+            rows["expected_half_width_percent"] = round(float(summary), 2)
         print(name, {pull: row["mean_abs_error_percent"] for pull, row in found[name].items()})
     mean = {
         pull: round(

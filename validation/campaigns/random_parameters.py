@@ -63,21 +63,23 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=10_000, help="sets of each law")
     parser.add_argument("--device", default="cpu")
-    asked = parser.parse_args()
-    bench = Bench(load(), device=asked.device, workers=cores())
-    laws = {law: surveyed(bench, law, asked.count) for law in (NEO_HOOKEAN, RUBBER)}
+    requested = parser.parse_args()
+    bench = Bench(load(), device=requested.device, workers=cores())
+    laws = {law: surveyed(bench, law, requested.count) for law in (NEO_HOOKEAN, RUBBER)}
     unmarked = sum(one["not_finite"] for law in laws.values() for one in law.values())
     command = "python -m validation.campaigns.random_parameters"
     content = {
         "asked": "No rollout and no launch that is not finite and not marked as failed.",
-        "sets": asked.count,
+        "sets": requested.count,
         "seed": SEED,
         "unmarked": unmarked,
         "met": unmarked == 0,
         "laws": laws,
-        **environment(asked.device, f"{command} --count {asked.count} --device {asked.device}"),
+        **environment(
+            requested.device, f"{command} --count {requested.count} --device {requested.device}"
+        ),
     }
-    path = Path(REPORT.format(asked.device.replace(":", "-")))
+    path = Path(REPORT.format(requested.device.replace(":", "-")))
     write_json(path, content)
     print(f"{path}: {unmarked} unmarked")
 

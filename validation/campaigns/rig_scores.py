@@ -71,13 +71,13 @@ class RigIdentification:
     """What a method has found in one episode.
 
     Attributes:
-        told: What `found` says of it.
+        confidence: What `found` says of it.
         theta: Parameters by name.
         seconds: Of the identification.
     """
 
     outcome: Calibrated
-    told: dict
+    confidence: dict
     theta: dict[str, float]
     seconds: float
 
@@ -103,10 +103,10 @@ def identified(
     if recorded_pads:
         friction = params.methods[OURS].fixed["dynamic_friction"]
         sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
-    outcome, told = found(params, method, sling, [episode])
+    outcome, confidence = found(params, method, sling, [episode])
     seconds, names = time.perf_counter() - start, SearchBox.of_method(params, method).names
     theta = {name: outcome.identified[name] for name in names}
-    return RigIdentification(outcome, told, theta, seconds)
+    return RigIdentification(outcome, confidence, theta, seconds)
 
 
 def errors_on_the_rig(band: str, params: Params, draws: np.ndarray) -> np.ndarray:
@@ -178,14 +178,16 @@ def summary(results: list[dict]) -> dict:
     error, miss, low, high = (
         np.array([one[name] for one in results], float) for name in ("error", "miss", "low", "high")
     )
-    told = np.isfinite(low) & np.isfinite(miss)
-    inside = np.array([one["inside"] for one in results])[told]
+    confidence = np.isfinite(low) & np.isfinite(miss)
+    inside = np.array([one["inside"] for one in results])[confidence]
     return {
         "bias": np.nanmean(error, axis=1),
         "mean_bias": np.nanmean(error),
         "mean_miss_m": np.nanmean(np.abs(miss)),
         "failed": int(np.isnan(error).sum()),
-        "coverage": inside.mean() if told.any() else np.nan,
-        "launches": int(told.sum()),
-        "median_width": np.nanmedian(((high - low) / TARGETS)[told]) if told.any() else np.nan,
+        "coverage": inside.mean() if confidence.any() else np.nan,
+        "launches": int(confidence.sum()),
+        "median_width": np.nanmedian(((high - low) / TARGETS)[confidence])
+        if confidence.any()
+        else np.nan,
     }

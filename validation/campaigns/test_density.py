@@ -38,7 +38,7 @@ def test_recordings_that_this_project_did_not_make(params: Params, progress, rec
     for name, own in [*zip(names, [[one] for one in episodes], strict=True), ("all", episodes)]:
         place = FOLDER / (name if name in names else names[0])
         sling = sling_of(params, "orange", OURS, place)
-        calibrated, told = density.found(params, OURS, sling, own)
+        calibrated, confidence = density.found(params, OURS, sling, own)
         error = calibrated(draws).landing_y / measured - 1
         ends = landing_intervals(calibrated, draws, calibrated.samples, 1e-3)
         figures[name] = {
@@ -47,14 +47,14 @@ def test_recordings_that_this_project_did_not_make(params: Params, progress, rec
             "inside": int(((measured >= ends[:, 0]) & (measured <= ends[:, 1])).sum()),
             "launches": len(measured),
             "mean_width": np.nanmean((ends[:, 1] - ends[:, 0]) / measured),
-            "turn_damping": told["derived"]["turn_damping"],
-            "pictures": [one["pictures"] for one in told["recordings"]],
+            "turn_damping": confidence["derived"]["turn_damping"],
+            "pictures": [one["pictures"] for one in confidence["recordings"]],
         }
         progress(f"  {name}: {100 * figures[name]['bias']:+.2f} %")
     record(
         "density-orange",
-        asked="Landings of a band that this project did not make: |bias| at most 2 % by each of its"
-        " three recordings, 1.2 % by all together. No landing was evidence; the choice of"
+        requested="Landings of a band that this project did not make: |bias| at most 2 % by each of"
+        " its three recordings, 1.2 % by all together. No landing was evidence; the choice of"
         " `turn_damping` as a coordinate came from these recordings' pictures.",
         met=all(abs(figures[name]["bias"]) <= 0.02 for name in names)
         and abs(figures["all"]["bias"]) <= 0.012,

@@ -162,11 +162,13 @@ def band_figures(params: Params, root: Path, band: str, methods, progress) -> di
         for method in methods:
             one = split(params, root, world, (tried, landing), method)
             result["methods"][method] = one
-            said = [
+            message = [
                 f"{name} {100 * v['mean_error_m']:.2f} ({100 * v['without_noise_m']:.2f})"
                 for name, v in one["variants"].items()
             ]
-            progress(f"  {band} {method} [cm] (without noise): {', '.join(said)}; {one['limits']}")
+            progress(
+                f"  {band} {method} [cm] (without noise): {', '.join(message)}; {one['limits']}"
+            )
     return result
 
 
@@ -222,10 +224,10 @@ def test_what_the_error_of_a_landing_is_made_of(tmp_path, progress, record) -> N
     }
     record(
         "gap",
-        asked="On the virtual rig, with the errors of the floor's own launches (those of the trials"
-        f" and more): the mean error of {OURS} is at most {FACTOR:g} times the actuation floor on"
-        " each band, and no launch fails. Reported beside it: the error with one thing at a time"
-        " made perfect, and what the bias of each target is made of.",
+        requested="On the virtual rig, with the errors of the floor's own launches (those of the"
+        f" trials and more): the mean error of {OURS} is at most {FACTOR:g} times the actuation"
+        " floor on each band, and no launch fails. Reported beside it: the error with one thing"
+        " at a time made perfect, and what the bias of each target is made of.",
         met=all(met.values()),
         settings={
             "methods": METHODS,

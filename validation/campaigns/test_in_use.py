@@ -35,5 +35,5 @@ def test_what_a_user_sets_turns_no_test_red(tmp_path) -> None:
     (folder / "data/theta/orange").mkdir(parents=True)
     (folder / "data/theta/orange/least_squares.json").write_text("{}")
     copy.commit()
-    said = copy(sys.executable, "-m", "pytest", "-q", "-m", "not slow and not validation")
-    assert " passed" in said and "failed" not in said
+    message = copy(sys.executable, "-m", "pytest", "-q", "-m", "not slow and not validation")
+    assert " passed" in message and "failed" not in message

@@ -32,7 +32,7 @@ def test_the_band_is_found_in_every_look(params: Params, progress, record) -> No
     )
     record(
         "looks",
-        asked="In every look of band and background (ray-traced, with shadows, noise of time of"
+        requested="In every look of band and background (ray-traced, with shadows, noise of time of"
         " flight, flying pixels, JPEG, extrinsics off by 1 mm and 0.09 degrees), over all frames:"
         f" the cloud's median distance to the band's surface is at most {1e3 * MOST_OFF:g} mm,"
         f" {100 * LEAST_COVERED:g} % of its visible length has points within 5 mm, at most"

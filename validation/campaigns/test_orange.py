@@ -105,8 +105,8 @@ def test_landings_are_predicted_within_the_recorded_stretch(
     met = inside.launches > 0 and inside.mean <= LIMIT and not unpredicted
     record(
         "orange",
-        asked="Identified from one recording by an independent engine and renderer (no robot), with"
-        f" the default budget: {OURS} predicts the launches inside the recorded stretch within"
+        requested="Identified from one recording by an independent engine and renderer (no robot),"
+        f" with the default budget: {OURS} predicts the launches inside the recorded stretch within"
         f" {100 * LIMIT:g} % of distance on average. The landings are never used for fitting.",
         met=bool(met),
         settings={

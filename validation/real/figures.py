@@ -40,13 +40,13 @@ def draw(folder: Path, source: Path, content: dict) -> None:
 
 
 def draw_ropes(
-    folder: Path, runs: dict[str, np.ndarray], told: dict[str, np.ndarray], content: dict
+    folder: Path, runs: dict[str, np.ndarray], summary: dict[str, np.ndarray], content: dict
 ) -> None:
     """ropes.png: predicted runs (T, M, 3) at four times, seen from the side, and their error."""
     folder.mkdir(parents=True, exist_ok=True)
     figure, rows = plt.subplots(2, len(runs), figsize=(11, 5), height_ratios=(2, 1), sharey="row")
     for name, shape, error in zip(runs, *rows, strict=True):
-        run, other = runs[name], told[name]
+        run, other = runs[name], summary[name]
         for k, frame in enumerate(np.linspace(0, len(run) - 1, 5).astype(int)[1:]):
             side, top = _side(run[frame]), run[frame, [0, -1], 2].max() + APART * k
             for one, style in ((run, "o-"), (other, "-")):

@@ -94,8 +94,11 @@ def memory_of(curves: list[Curve], names: tuple[str, ...] = NAMES) -> list[Curve
         bounds=([1e-6 * peak, *low], [1e3 * peak, *high]),
         x_scale=[peak, *(0.1 for _ in names)],
     )
-    told = {"shear_modulus": float(found.x[0]), **{k: float(v) for k, v in values(found.x).items()}}
-    return [CurveFit(told, one) for one in left(found.x)]
+    summary = {
+        "shear_modulus": float(found.x[0]),
+        **{k: float(v) for k, v in values(found.x).items()},
+    }
+    return [CurveFit(summary, one) for one in left(found.x)]
 
 
 def biaxial(rows: np.ndarray, shape: tuple[float, float]) -> np.ndarray:

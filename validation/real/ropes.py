@@ -151,10 +151,10 @@ def fitted(
     def left(logs: np.ndarray) -> np.ndarray:
         values: dict[str, float] = dict(zip(NAMES, np.exp(logs).tolist(), strict=True))
         try:
-            told = swing(run, chords, values, setup, parts=parts)
+            summary = swing(run, chords, values, setup, parts=parts)
         except ArithmeticError:  # steps that do not converge: as far off as a rope is long
-            told = run + chords.sum()
-        return (inner(told) - inner(run)).ravel()
+            summary = run + chords.sum()
+        return (inner(summary) - inner(run)).ravel()
 
     low, high = np.log([REACH[name] for name in NAMES]).T
     begin = np.log([start[name] for name in NAMES])

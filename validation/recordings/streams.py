@@ -94,8 +94,8 @@ class Bag:
     @property
     def force(self) -> np.ndarray:
         """Shape (S, 3) [N]."""
-        told = [one.content.wrench.force for one in self.of(FORCE)]
-        return np.array([[force.x, force.y, force.z] for force in told])
+        summary = [one.content.wrench.force for one in self.of(FORCE)]
+        return np.array([[force.x, force.y, force.z] for force in summary])
 
     @force.setter
     def force(self, values: np.ndarray) -> None:

@@ -128,8 +128,8 @@ def growth(bench: Bench, count: int = 48) -> list[Measure]:
             for kind in STATES
         }
         every = np.concatenate(list(energies.values()))
-        kept = ", ".join(f"{len(energy)} {kind}" for kind, energy in energies.items())
-        note = f"kept of {2 * count} random states and θ each: {kept}; the others are marked failed"
+        retained = ", ".join(f"{len(energy)} {kind}" for kind, energy in energies.items())
+        note = f"kept of {2 * count} random states and θ each: {retained}; others are marked failed"
         checks.append(
             Measure(
                 f"rise above the start, {label}, {1e3 * h:g} ms",

@@ -102,9 +102,9 @@ def remembered(
         worst[k + 1] = np.maximum(worst[k] if goes_on else rod.worst, done[k + 1])
     follow = np.where(moving[:, None], table["follow"], 0.0)
     for k in np.flatnonzero(moving):
-        kept = table["forget"][k] * overstress[k]
-        carried[k] = weight * (kept - np.outer(stress[k], follow[k])).sum(-1)
-        overstress[k + 1] = kept + np.outer(stress[k + 1] - stress[k], follow[k])
+        retained = table["forget"][k] * overstress[k]
+        carried[k] = weight * (retained - np.outer(stress[k], follow[k])).sum(-1)
+        overstress[k + 1] = retained + np.outer(stress[k + 1] - stress[k], follow[k])
     free, power = rod.branches(overstress, columns)
     lost = np.where(moving, table["h"] * (power[1:] + power[:-1]) / 2, 0.0)
     return Remembered(carried, weight * follow.sum(-1)[:, None], worst, free[1:], lost)

@@ -191,9 +191,9 @@ class ReferenceRod:
         """Free energy [J] of branches with overstress (..., E, 8), and the power they lose [W]."""
         stretch = self.stretch(columns)[..., None]
         stress = self.uniaxial(stretch)
-        kept = stress - overstress
-        q = self.stretch_at(kept)
-        free = self.uniaxial(stretch, -1) - self.uniaxial(q, -1) - kept * (stretch - q)
+        retained = stress - overstress
+        q = self.stretch_at(retained)
+        free = self.uniaxial(stretch, -1) - self.uniaxial(q, -1) - retained * (stretch - q)
         lost = overstress * (stretch - q) / TIMES
         volume = self.branch * self.sling.area * self.sling.edge_lengths
         return tuple((one.sum(-1) * volume).sum(-1) for one in (free, lost))

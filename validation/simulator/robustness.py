@@ -41,11 +41,11 @@ def on_faces(bench: Bench, count: int) -> Parameters:
 def ranges(thetas: list[dict[str, float]], names=THETA) -> str:
     """Between what bounds the parameters of thetas lie; one that all share is named as such."""
 
-    def told(name: str) -> str:
+    def summary(name: str) -> str:
         low, high = (f"{f([one[name] for one in thetas]):.3g}" for f in (min, max))
         return f"{name} {low}" if low == high else f"{name} {low}–{high}"
 
-    return ", ".join(told(name) for name in names)
+    return ", ".join(summary(name) for name in names)
 
 
 def survey(
@@ -115,12 +115,12 @@ def section(
     surveys = {"held_fast": held, "default_grip": gripped, "launches": launched} | edges
     allowed = ALLOWED * count / COUNT
 
-    def told(reasons: dict) -> str:
+    def summary(reasons: dict) -> str:
         return "; ".join(f"{number} “{reason}”" for reason, number in reasons.items()) or "none"
 
     def failed(name: str, one: dict) -> Measure:
         total = float(sum(one["reasons"].values()))
-        return Measure(name, "—", total, "θ", None, told(one["reasons"]))
+        return Measure(name, "—", total, "θ", None, summary(one["reasons"]))
 
     boundary = [
         Measure(
@@ -153,7 +153,7 @@ def section(
             float(len(held["unconverged"])),
             "θ",
             allowed,
-            told(held["reasons"]),
+            summary(held["reasons"]),
         ),
         *boundary,
         failed(f"failed of {launches} with the default grip", gripped),

@@ -119,12 +119,12 @@ def cycle(bench: Bench, most: float = 1.8, softening: float = SOFTENING) -> list
     got, _ = drawn_across(bench, sling, path, times, **own(shape, 0.0, softening))
     path, worst = path[1:], np.maximum.accumulate(path)[1:]
     left = [left_of(*pair, shape, softening) for pair in zip(path, worst, strict=True)]
-    told, taut = stress(path, shape) * left, path > 1.05
+    summary, taut = stress(path, shape) * left, path > 1.05
     return [
         Measure(
             f"stress of a slow cycle to stretch {most:g}, back, to {most + 0.2:g}, worst moment",
             "Ogden and Roxburgh's pseudo-elastic softening, by integrated works",
-            float(100 * np.abs(got - told)[taut].max() / told.max()),
+            float(100 * np.abs(got - summary)[taut].max() / summary.max()),
             "% of its peak",
             PULL_LIMIT,
             f"softening {softening:g}: {100 * (1 - min(left)):.0f} % less on the way back",
@@ -146,8 +146,8 @@ def relaxation(bench: Bench, shape=SHAPE, most: float = 1.6) -> list[Measure]:
         beside = own(shape, softening=0.0)
         got, at = drawn_across(bench, _string(bench, 10.0), stretch, times, **beside)
         chosen = np.flatnonzero((at > first) & (stretch[1:] > 1.05))[::40]
-        told = np.array([integral(history, at[k], shape, RELAXATION) for k in chosen])
-        worst = 100 * np.abs(got[chosen] - told).max() / told.max()
+        summary = np.array([integral(history, at[k], shape, RELAXATION) for k in chosen])
+        worst = 100 * np.abs(got[chosen] - summary).max() / summary.max()
         checks.append(
             Measure(
                 f"stress {name}, to {100 * (most - 1):.0f} % strain, worst moment",
@@ -177,9 +177,9 @@ def oscillator(bench: Bench, shape=SHAPE, stretch: float = 1.5) -> list[Measure]
     rates = np.zeros((10, 10))  # of place, speed, and what the branches carry of k x
     rates[0, 1], rates[1, 0], rates[1, 2:] = 1, -k / moving, -k * weight / moving
     rates[2:, 1], rates[2:, 2:] = 1, -np.diag(1 / TIMES)
-    step, state, told = expm(rates * time[1]), np.append(place[0], np.zeros(9)), []
+    step, state, summary = expm(rates * time[1]), np.append(place[0], np.zeros(9)), []
     for _ in time:
-        told.append(state[0])
+        summary.append(state[0])
         state = step @ state
 
     def modes(place: np.ndarray) -> tuple[float, float]:
@@ -192,7 +192,7 @@ def oscillator(bench: Bench, shape=SHAPE, stretch: float = 1.5) -> list[Measure]
 
     checks = []
     against = "m x'' + k (x + w Σ o) = 0, o' = x' − o/t, by the matrix exponential"
-    both = zip(modes(place), modes(np.array(told)), strict=True)
+    both = zip(modes(place), modes(np.array(summary)), strict=True)
     for (name, limit, unit), (one, other) in zip(
         (("frequency", FREQUENCY_LIMIT, "Hz"), ("decay", DECAY_LIMIT, "/s")), both, strict=True
     ):
@@ -204,7 +204,7 @@ def oscillator(bench: Bench, shape=SHAPE, stretch: float = 1.5) -> list[Measure]
 
 def growth(bench: Bench, count: int = 16, kinds=tuple(STATES)) -> list[Measure]:
     """Elastic, kinetic and the branches' energy after random states, relaxed there, are let go."""
-    rng, worst, kept = np.random.default_rng(SEED), 0.0, 0
+    rng, worst, retained = np.random.default_rng(SEED), 0.0, 0
     for kind in kinds:
         thetas = agreement.random_thetas(bench, count, SEED)
         starts = random_states(band_of(bench), kind, count, rng)
@@ -218,7 +218,7 @@ def growth(bench: Bench, count: int = 16, kinds=tuple(STATES)) -> list[Measure]:
             motion = move(bench, sling, parameters, table, start, gravity=0.0, double=True)
             if motion.failed[0]:
                 continue
-            rod, kept = ReferenceRod(sling, parameters, gravity=0.0), kept + 1
+            rod, retained = ReferenceRod(sling, parameters, gravity=0.0), retained + 1
             memory = energy.remembered(rod, table, motion.start[0], motion.x[0])
             band = replace(rod, worst=memory.worst[1:])
             total = band.elastic(motion.x[0]) + rod.kinetic(motion.v[0]) + memory.free
@@ -231,7 +231,7 @@ def growth(bench: Bench, count: int = 16, kinds=tuple(STATES)) -> list[Measure]:
             worst,
             "of the start",
             ROUNDING,
-            f"{kept} of {count * len(kinds)} random states, of BOX; others are marked failed",
+            f"{retained} of {count * len(kinds)} random states, of BOX; others are marked failed",
         )
     ]
 

@@ -107,8 +107,8 @@ def verify(
                 temporary.write_bytes(picture.read_bytes())
     scripts = [Path(inspect.getfile(one)) for one in (verify, *(extra or {}).values())]
     known = environment(device, f"sling verify --device {device}", *scripts)
-    kept = ("device", "simulator", "code") + (() if device == "cpu" else ("device_name",))
-    about = {name: known[name] for name in kept}
+    retained = ("device", "simulator", "code") + (() if device == "cpu" else ("device_name",))
+    about = {name: known[name] for name in retained}
     write_text(root / f"reports/{name}.md", markdown(sections, about, name))
     write_json(root / f"reports/{name}.json", about | {"sections": list(map(_entry, sections))})
     return sections

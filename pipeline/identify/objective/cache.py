@@ -85,7 +85,7 @@ class EvaluationCache:
             return None
         terms = {name: arrays[f"term_{name}"] for name in TERMS}
         failure = [str(reason) or None for reason in arrays["failure"]]
-        kept = arrays["weighed"].tolist()
-        if NOT_FINITE in failure and kept != self._weighed:
+        retained = arrays["weighed"].tolist()
+        if NOT_FINITE in failure and retained != self._weighed:
             return None
         return weighed(self.evaluate.loss, unit, theta, terms, failure)

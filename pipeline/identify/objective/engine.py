@@ -30,8 +30,8 @@ def simulate_of(engine: str) -> Simulate:
     try:
         found = imported(engine if is_import(engine) else _installed(engine))
     except Exception as error:  # a module of the user's may raise anything
-        said = one_line(f"{type(error).__name__}: {error}")
-        raise UserError(f"engine {engine}: cannot be imported ({said})") from error
+        message = one_line(f"{type(error).__name__}: {error}")
+        raise UserError(f"engine {engine}: cannot be imported ({message})") from error
     if not callable(found):
         raise UserError(f"engine {engine}: must be a function; see docs/simulator.md")
     return cast(Simulate, found)
@@ -45,7 +45,7 @@ def _installed(engine: str) -> str:
 
 
 def sources_of(engine: str) -> list[Path]:
-    """The folder of another engine's code, which its rollouts hang on; none for ours."""
+    """The folder of another engine's code, which its rollouts depend on; none for ours."""
     if engine == OUR_ENGINE:
         return []
     source = inspect.getsourcefile(simulate_of(engine))

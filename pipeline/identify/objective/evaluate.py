@@ -131,7 +131,7 @@ def weighed(
 
 
 class Penalty:
-    """What an optimiser is told: a failed point counts twice the worst finite loss so far."""
+    """The losses that an optimiser gets: a failed point has twice the worst finite loss so far."""
 
     def __init__(self) -> None:
         self.worst = 0.0

@@ -221,7 +221,7 @@ class EpisodeLoss:
         nothing = np.full(len(frames), np.nan)
         if not chosen.any():
             return nothing
-        # not frames[:, chosen]: its order in memory, and so the sum's, would hang on N
+        # not frames[:, chosen]: its order in memory, and so the sum's, would depend on N
         return 100 * frames.compress(chosen, axis=1).mean(axis=1)
 
     def _filter(self, times: np.ndarray) -> csr_array:

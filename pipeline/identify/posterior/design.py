@@ -137,8 +137,8 @@ class PullDesign:
 
     def variances(self, dips: Sequence[Dip]) -> np.ndarray:
         """Expected variances of the log landings after a pull with these dips, shape (T,)."""
-        told = self.information(dips) + np.diag(self.precision)
-        return self._left(np.linalg.inv(told))
+        progress = self.information(dips) + np.diag(self.precision)
+        return self._left(np.linalg.inv(progress))
 
     @property
     def before(self) -> np.ndarray:
@@ -163,8 +163,8 @@ class PullDesign:
         None at draws at which a simulation does not reach its end.
         """
         episode, steps = self.episode(dips), self.coordinates.steps
-        felt = [i for i, name in enumerate(self.coordinates.names) if name in FELT]
-        moved = np.vstack([0 * steps, np.diag(steps)[felt]])
+        affected = [i for i, name in enumerate(self.coordinates.names) if name in FELT]
+        moved = np.vstack([0 * steps, np.diag(steps)[affected]])
         count, size = len(self.phi), len(moved)
         around = (self.phi[:, None] + moved).reshape(count * size, -1)
         done = interact(
@@ -182,12 +182,12 @@ class PullDesign:
         # without the recorded force's low-pass, which a leg of 0.2 s passes unchanged
         force = average(done.times, along, *sampling, len(episode.time))
         force = np.moveaxis(force[Rule().samples(episode)], 0, 1).reshape(count, size, -1, 2)
-        told = np.zeros((count, len(steps), len(steps)))
-        for one, bad, at in zip(force, failed, told, strict=True):
+        progress = np.zeros((count, len(steps), len(steps)))
+        for one, bad, at in zip(force, failed, progress, strict=True):
             if not bad.any():
-                slopes = (one[1:] - one[0]) / steps[felt, None, None]
-                at[np.ix_(felt, felt)] = eliminated(slopes, one[0], episode.sample_period)
-        return told
+                slopes = (one[1:] - one[0]) / steps[affected, None, None]
+                at[np.ix_(affected, affected)] = eliminated(slopes, one[0], episode.sample_period)
+        return progress
 
 
 def drawn(
@@ -284,19 +284,19 @@ class _Landings:
 def searched(
     design: PullDesign,
     limits: PullLimits,
-    told: Callable[[Sequence[Dip], float], None] = lambda dips, variance: None,
+    progress: Callable[[Sequence[Dip], float], None] = lambda dips, variance: None,
 ) -> tuple[Dip, ...]:
     """The best dips found: up to MOST_DIPS of a coarse set one by one, then all moved together.
 
     Args:
-        told: Of each pull that was tried, and the mean of its variances.
+        progress: Of each pull that was tried, and the mean of its variances.
     """
     size, found = float(np.hypot(*design.draw)), {}
 
     def value(dips: tuple[Dip, ...]) -> float:
         if dips not in found:
             found[dips] = float(design.variances(dips).mean())
-            told(dips, found[dips])
+            progress(dips, found[dips])
         return found[dips]
 
     best: tuple[Dip, ...] = ()

@@ -74,7 +74,7 @@ def fit(
     Args:
         launches: That are evidence too.
         workers: Threads; they change no result.
-        progress: Is told of each expansion that is nearer.
+        progress: Called for each expansion that is nearer.
     """
     phi, nuisances = np.array(start, float), np.zeros((len(recordings), 3))
     best: Fit | None = None
@@ -85,8 +85,8 @@ def fit(
             around = coordinates.parameters, phi, _steps(coordinates, phi)
             try:
                 expansions = [
-                    one.expand(*around, own, pool, kept)
-                    for one, own, kept in zip(recordings, nuisances, bins, strict=True)
+                    one.expand(*around, own, pool, retained)
+                    for one, own, retained in zip(recordings, nuisances, bins, strict=True)
                 ]
             except Failed as why:
                 if best is None:

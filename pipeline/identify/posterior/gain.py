@@ -79,27 +79,27 @@ class LandingModel:
         """Covariance after `count` launches at one of the targets were measured to `tape` [m]."""
         slope = self.gradient[aim]
         noise = (self.draw[aim] ** 2 + tape**2) / count
-        told = self.covariance @ slope
-        return self.covariance - np.outer(told, told) / (slope @ told + noise)
+        explained = self.covariance @ slope
+        return self.covariance - np.outer(explained, explained) / (slope @ explained + noise)
 
     def exact(self, names: Collection[str]) -> np.ndarray:
         """Covariance if these unknowns were known exactly."""
         which = [self.names.index(name) for name in names if name in self.names]
-        told = self.covariance[:, which]
-        return self.covariance - told @ np.linalg.solve(told[which], told.T)
+        explained = self.covariance[:, which]
+        return self.covariance - explained @ np.linalg.solve(explained[which], explained.T)
 
-    def told(self, name: str, spread: float) -> np.ndarray:
-        """Covariance after an unknown was told to a standard deviation."""
+    def explained(self, name: str, spread: float) -> np.ndarray:
+        """Covariance after an unknown was measured to a standard deviation."""
         place = self.names.index(name)
-        told = self.covariance[:, place]
-        return self.covariance - np.outer(told, told) / (told[place] + spread**2)
+        explained = self.covariance[:, place]
+        return self.covariance - np.outer(explained, explained) / (explained[place] + spread**2)
 
     def pulled(self, pulls: int = 1) -> np.ndarray:
         """Covariance after another pull that tells as much as each of the `pulls` did."""
         prior = self._prior()
         values, vectors = np.linalg.eigh(np.linalg.inv(self.covariance) - prior)
-        told = (vectors * np.maximum(values, 0)) @ vectors.T
-        return np.linalg.inv(np.linalg.inv(self.covariance) + told / pulls)
+        explained = (vectors * np.maximum(values, 0)) @ vectors.T
+        return np.linalg.inv(np.linalg.inv(self.covariance) + explained / pulls)
 
     def _prior(self) -> np.ndarray:
         """Precision (D, D) of what is known without any pull; a bound tells as its own spread."""

@@ -172,9 +172,9 @@ def disagreement(found: Fit) -> float:
     total = freedom = 0.0
     for one in found.expansions:
         inverse = np.linalg.inv(one.hessian + found.hessian)  # regular where it alone tells nothing
-        told = np.linalg.solve(found.hessian, one.hessian)
+        summary = np.linalg.solve(found.hessian, one.hessian)
         total += one.gradient @ inverse @ one.gradient
-        freedom += np.trace(inverse @ one.hessian @ (np.eye(len(told)) - told))
+        freedom += np.trace(inverse @ one.hessian @ (np.eye(len(summary)) - summary))
     return float(np.sqrt(max(total / max(freedom, 1e-9), 1.0)))
 
 
@@ -227,7 +227,7 @@ def confidence(found: Identified) -> dict:
 
 
 def _priors(found: Identified) -> dict[str, dict]:
-    """Of what is not fixed: the prior's interval, all else as at the mode; whether it is told."""
+    """Of what is not fixed: the prior's interval, all else at the mode; if it is identified."""
     coordinates, result = found.coordinates, {}
     ends = coordinates.prior(LEVEL)
     widths = np.ptp(np.quantile(found.samples, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0), axis=0)
@@ -242,8 +242,8 @@ def _priors(found: Identified) -> dict[str, dict]:
             values = at.column("elasticity_damping") * at.column("damping_scale")
         else:
             values = at.column(name)
-        told = bool(widths[axis] < FILLS * np.ptp(ends[:, axis]))
-        result[name] = {"prior": values.tolist(), "identifiable": told}
+        summary = bool(widths[axis] < FILLS * np.ptp(ends[:, axis]))
+        result[name] = {"prior": values.tolist(), "identifiable": summary}
     return result
 
 

@@ -29,7 +29,7 @@ from pipeline.simulator.parameters import Parameters
 
 SIMULATED = "release", "camera", "hand"
 UNLIKE = 0.05  # an autocorrelation that is none
-TOLD = 3e-5  # s: of the release, where the clocks are told by it
+RELEASE_ERROR = 3e-5  # s: of the release, where the clocks are known by it
 NUDGE = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
 
 
@@ -42,7 +42,7 @@ class Tolerances:
             so does what the law gets wrong of the pull: 30 mN each are worth 30 sqrt(14) alone.
         cloud, way: Of a bin of a picture [m], and of the recoil as a share of the way gone.
         release, camera: Of the release and of the camera's clock against the force's [s]. A camera
-            whose clock is told by the release has all of it.
+            whose clock is known by the release has all of it.
         hand: Of the hand's place along the pull [m].
         jitter: Of one picture's stamp [s].
         shift, turn: Of the camera's extrinsics [m], [rad].
@@ -70,14 +70,14 @@ class Tolerances:
         """From an episode's metadata, or as usual where it says nothing."""
         about = episode.metadata.get("preprocessing", {})
         delays = about.get("delays") or {}
-        told = {name: delays.get(name) or {} for name in ("camera", "pose")}
-        given = {name: one.get("left") or one.get("error") for name, one in told.items()}
+        clocks = {name: delays.get(name) or {} for name in ("camera", "pose")}
+        given = {name: one.get("left") or one.get("error") for name, one in clocks.items()}
         given["release"] = about.get("release_error")
-        if given["camera"] and told["camera"].get("against", "pose") == "pose":
+        if given["camera"] and clocks["camera"].get("against", "pose") == "pose":
             given["camera"] = np.hypot(given["camera"], given["pose"] or 0.0)
-            if told["pose"].get("against") == "release":  # and so is the camera's, by the pose
+            if clocks["pose"].get("against") == "release":  # and so is the camera's, by the pose
                 given["pose"] = np.hypot(given["pose"] or 0.0, given["release"] or 0.0)
-                given["release"] = TOLD
+                given["release"] = RELEASE_ERROR
         return cls(**{name: float(value) for name, value in given.items() if value})
 
     @property

@@ -148,11 +148,11 @@ def history_of(params: Params, content: dict) -> LaunchHistory | None:
 
     As params.yaml's `launch` says, or else as the recording's hand did.
     """
-    asked = {"pull_time": params.launch.pull_time, "pause": params.launch.pause}
+    requested = {"pull_time": params.launch.pull_time, "pause": params.launch.pause}
     if content.get("law", NEO_HOOKEAN) != RUBBER:
         return None
-    told = {name: value for name, value in asked.items() if value is not None}
-    return LaunchHistory(**content["history"] | told)
+    stated = {name: value for name, value in requested.items() if value is not None}
+    return LaunchHistory(**content["history"] | stated)
 
 
 def parameters_of(content: dict) -> Parameters:

@@ -71,8 +71,8 @@ def build(
     try:
         optimizer = kind(dimension, **settings)
     except Exception as error:  # and so may its class
-        said = f"{error}" if isinstance(error, (TypeError, ValueError)) else f"{error!r}"
-        raise _refusal(name, f"does not take its settings: {said}") from error
+        message = f"{error}" if isinstance(error, (TypeError, ValueError)) else f"{error!r}"
+        raise _refusal(name, f"does not take its settings: {message}") from error
     lacking = [part for part in ("ask", "tell") if not callable(getattr(optimizer, part, None))]
     if not isinstance(getattr(optimizer, "phase", None), str):
         lacking.append("phase, a text")

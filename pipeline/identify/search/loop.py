@@ -1,4 +1,4 @@
-"""The loop around every optimiser: it asks, its points are evaluated, it is told their losses.
+"""The loop around every optimiser: it asks, its points are evaluated, it gets their losses.
 
 An optimiser knows only the unit cube of the axes that are free. It is a class that is called as
 `Class(dimension, *, rollouts, seed, population, **settings)`; `pipeline.identify.search.build`
@@ -59,8 +59,8 @@ def search(
 ) -> None:
     """Run `optimizer` until exactly `rollouts` points are evaluated; all rows go to `history`.
 
-    The last batch is cut to what is left, and a cut batch is not told. A failed point is told as
-    twice the worst finite loss so far.
+    The last batch is cut to what is left, and the optimiser does not see a cut batch. A failed
+    point gets twice the worst finite loss so far.
 
     Args:
         evaluate: Losses of points of the whole unit cube, shape (N, D).
@@ -73,9 +73,9 @@ def search(
     penalty = Penalty()
     generation = 0
     while rollouts > 0:
-        asked = _checked(optimizer, dimension)
-        owner = _owner(optimizer, len(asked))
-        unit = asked[:rollouts]
+        requested = _checked(optimizer, dimension)
+        owner = _owner(optimizer, len(requested))
+        unit = requested[:rollouts]
         rollouts -= len(unit)
         evaluation = evaluate(unit if box is None else box.fill(unit))
         history.add(
@@ -85,31 +85,31 @@ def search(
             solver=None if owner is None else owner[: len(unit)],
         )
         generation += 1
-        if len(unit) == len(asked):
+        if len(unit) == len(requested):
             optimizer.tell(penalty(evaluation.total))
 
 
 def _owner(optimizer: Optimizer, count: int) -> np.ndarray | None:
     """Which of its solvers asked for each point, shape (count,), where it says so."""
-    said = getattr(optimizer, "owner", None)
-    if said is None:
+    owner_name = getattr(optimizer, "owner", None)
+    if owner_name is None:
         return None
     try:
-        owner = np.asarray(said)
+        owner = np.asarray(owner_name)
         if owner.shape == (count,) and (owner == owner.astype(np.int32)).all():
             return owner.astype(np.int32)
     except (TypeError, ValueError):
         pass  # it is no array of numbers
     raise UserError(
         f"{type(optimizer).__name__}: owner must say by a number for each of {count} points who"
-        f" asked, and is {said!r:.40}"
+        f" asked, and is {owner_name!r:.40}"
     )
 
 
 def _checked(optimizer: Optimizer, dimension: int) -> np.ndarray:
-    asked = optimizer.ask()
+    requested = optimizer.ask()
     try:
-        unit = np.array(asked, float)
+        unit = np.array(requested, float)
     except (TypeError, ValueError):
         what = "no array of numbers"
     else:

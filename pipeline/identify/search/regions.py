@@ -93,13 +93,13 @@ def find_regions(
 
 def suppress(unit: np.ndarray, total: np.ndarray, radius: float, count: int) -> list[int]:
     """Rows, best first, that lie further than `radius` from every better row that was kept."""
-    kept: list[int] = []
+    chosen: list[int] = []
     for row in np.argsort(total, kind="stable"):
-        if all(np.linalg.norm(unit[row] - unit[other]) > radius for other in kept):
-            kept.append(int(row))
-        if len(kept) == count:
+        if all(np.linalg.norm(unit[row] - unit[other]) > radius for other in chosen):
+            chosen.append(int(row))
+        if len(chosen) == count:
             break
-    return kept
+    return chosen
 
 
 def regularised(covariance: np.ndarray) -> np.ndarray:
@@ -139,14 +139,14 @@ class RegionsFile(JsonRecord):
         return self
 
 
-def save_regions(path: Path, names: tuple[str, ...], regions: list[Region], asked: int) -> None:
+def save_regions(path: Path, names: tuple[str, ...], regions: list[Region], requested: int) -> None:
     """Write a `RegionsFile` with its axes' `names`, and how many regions were asked for."""
     clusters = [
         {"mu": one.mu.tolist(), "Sigma": one.sigma.tolist(), "loss": one.loss}
         | {"members": one.members}
         for one in regions
     ]
-    write_json(path, {"names": list(names), "asked": asked, "clusters": clusters})
+    write_json(path, {"names": list(names), "asked": requested, "clusters": clusters})
 
 
 def load_regions(path: Path) -> tuple[list[Region], list[str]]:

@@ -77,8 +77,8 @@ class Batch:
 
     def every(self, name: str) -> list:
         """What an attribute tells of each launch."""
-        told = getattr(self, name)
-        return [None] * len(self.draws) if told is None else list(told)
+        column_values = getattr(self, name)
+        return [None] * len(self.draws) if column_values is None else list(column_values)
 
     def save(self, path: Path) -> None:
         """Write one row a launch."""
@@ -142,8 +142,8 @@ def launched(batch: Batch, launch: Callable) -> Batch:
         tried = list(pool.map(launch, batch.draws, range(len(batch.draws))))
     landing = [one.landing_y if np.isfinite(one.landing_y) else None for one in tried]
     names = ("failure", "hold_force", "flight")
-    told = {name: [getattr(one, name) for one in tried] for name in names}
-    return replace(batch, kind="virtual", landing=landing, **told)
+    column_values = {name: [getattr(one, name) for one in tried] for name in names}
+    return replace(batch, kind="virtual", landing=landing, **column_values)
 
 
 def predict(

@@ -88,7 +88,7 @@ def _unit(modulus: float, weight: float | None) -> str:
     if weight is None:
         return " or ".join(fitting)
     fitting.sort(key=lambda name: abs(np.log(weight * UNITS[name] / WEIGHS)))
-    # What differs by a few percent is told by neither weight nor modulus.
+    # What differs by a few percent neither weight nor modulus shows.
     return " or ".join(name for name in fitting if 0.9 < UNITS[name] / UNITS[fitting[0]] < 1.1)
 
 

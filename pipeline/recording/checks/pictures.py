@@ -106,13 +106,13 @@ def of_coverage(rows: list[PictureLine]) -> Iterator[Finding]:
     shown = {row.phase for row in phases}
     for phase in (phase for phase in SEEN_AS if phase not in shown):
         yield Finding(UNSEEN.name, f"no picture shows how the band {SEEN_AS[phase]}", UNSEEN.remedy)
-    told = [(row.time, row.off_plane) for row in rows if row.off_plane is not None]
-    foreign = [time for time, off_plane in told if off_plane > FOREIGN]
+    measured = [(row.time, row.off_plane) for row in rows if row.off_plane is not None]
+    foreign = [time for time, off_plane in measured if off_plane > FOREIGN]
     if foreign:
         times = f"{foreign[0]:.2f} - {foreign[-1]:.2f} s"
         yield Finding(
             OFF_PLANE.name,
-            f"{len(foreign)} of {len(told)} pictures of the hanging band hold points off the plane"
-            f" that it hangs in ({times}): the hand, the arm or the background",
+            f"{len(foreign)} of {len(measured)} pictures of the hanging band hold points off the"
+            f" plane that it hangs in ({times}): the hand, the arm or the background",
             OFF_PLANE.remedy,
         )

@@ -24,7 +24,7 @@ UNDERSTOOD = Check(
     "what was recorded with a pull: a lead-in, a grasp, a draw, a release, pictures of a band",
     "each step's own",
     "",
-    "one of them is not there or cannot be told",
+    "one of them is not there or cannot be determined",
     "as the reason says (docs/faq.md)",
 )
 CHECKS: tuple[Check, ...] = (*(check for one in CONCERNS for check in one.CHECKS), UNDERSTOOD)

@@ -12,7 +12,7 @@ a while are worth comparing. The rule, for each break in a topic:
 | as before | go back, and log_time too | a step of the machine's clock: taken out |
 
 A step is taken out by continuity: the message after it comes a whole number of periods after the
-one before, that number being told by log_time. So a topic needs an even rate; the step of another
+one before, that number given by log_time. So a topic needs an even rate; the step of another
 topic is refused, as log_time alone is not good to a millisecond. Where several topics step at once,
 the fastest one tells by how much. A lone stamp far from both of its neighbours is damage, and so
 are one or two at the ends that log_time puts elsewhere.
@@ -24,7 +24,7 @@ costs 25 % of the damping: they are refused.
 
 Delays of receipt do not grow by themselves, so where a topic's least delays change against the
 wrench's all through the recording, its clock runs at another rate. That is taken out where it is
-known to a millisecond over the recording; how late the stamps were at the first one is not told.
+known to a millisecond over the recording; how late the stamps were at the first one is not known.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
-LEAST = 0.010  # s: smaller steps cannot be told from delays
+LEAST = 0.010  # s: smaller steps cannot be distinguished from delays
 WINDOW = 1.0  # s of log_time around a break in which the least delay is looked for
 LEAST_AROUND = 3  # messages on each side of a step
 EVEN = 0.2  # of the period, by which intervals of an even rate differ in the median
@@ -121,15 +121,15 @@ def outliers(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
     limit = max(FAR * 1e9, 10 * _period(stamp))
     found = np.abs(stamp - usual) > limit
     for order in (1, -1):
-        kept = np.flatnonzero(~found)[::order]
-        ways, by_log = np.abs(np.diff(stamp[kept])), np.abs(np.diff(log[kept]))
+        retained = np.flatnonzero(~found)[::order]
+        ways, by_log = np.abs(np.diff(stamp[retained])), np.abs(np.diff(log[retained]))
         far = ways > np.where(np.abs(ways - by_log) > limit / 2, limit, max(ALONE * 1e9, limit))
         begin = 0
         for i in np.flatnonzero(far[: 2 * LEAST_AROUND]):
-            if i + 1 - begin >= LEAST_AROUND or 2 * i > len(kept):
+            if i + 1 - begin >= LEAST_AROUND or 2 * i > len(retained):
                 break
             begin = i + 1
-        found[kept[:begin]] = True
+        found[retained[:begin]] = True
     return found
 
 

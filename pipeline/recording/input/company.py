@@ -10,7 +10,7 @@ from pipeline.recording.input import sets
 from pipeline.recording.input.roles import COMMANDS, Candidate, Choice
 
 DEVICE = ("wrench", "pose", "twist", "gripper")  # of one arm
-LEAST_FOLLOWS = 0.1  # share of the force's steps below which no hand is told by them
+LEAST_FOLLOWS = 0.1  # share of the force's steps below which they show no hand
 MOST_TOPICS = 60  # for a role, whose names are compared
 
 
@@ -52,7 +52,7 @@ class Company:
         return best, self._tie(best, chosen) if role == "pose" else ""
 
     def opened(self, gripper: Choice, wrench: Choice) -> Choice:
-        """The gripper's topic as one opening, of the fingers that let go of what the force felt."""
+        """The gripper's topic as one opening: that of the fingers whose release the force shows."""
 
         def fall() -> int | None:
             course = sets.course_of(wrench.channel, wrench.read)

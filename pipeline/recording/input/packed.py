@@ -110,8 +110,8 @@ def _chunks_fit(data: np.ndarray) -> bool:
     while at + PNG_CHUNK.size <= len(data):
         length, kind = PNG_CHUNK.unpack_from(data.data, at)
         end = at + PNG_CHUNK.size + length
-        said = int.from_bytes(data[end : end + 4].tobytes(), "big")
-        if end + 4 > len(data) or zlib.crc32(data[at + 4 : end].data) != said:
+        stored = int.from_bytes(data[end : end + 4].tobytes(), "big")
+        if end + 4 > len(data) or zlib.crc32(data[at + 4 : end].data) != stored:
             return False
         if kind == b"IEND":
             return True

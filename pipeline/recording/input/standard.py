@@ -19,7 +19,7 @@ from rosbags.typesys.store import Typestore
 ZSTD = b"\x28\xb5\x2f\xfd"  # no header of CDR begins so
 XCDR2 = range(0x06, 0x0C)  # second byte: OMG DDS-XTypes 1.3, table 60
 PACKAGES = ("geometry_msgs", "sensor_msgs", "std_msgs", "tf2_msgs")
-TOLD = (
+STAMPED = (
     "geometry_msgs/msg/WrenchStamped",
     "geometry_msgs/msg/PoseStamped",
     "sensor_msgs/msg/JointState",
@@ -70,7 +70,7 @@ def guessed(topic: str, encoding: str, payloads: Sequence[bytes]) -> Schema | No
     if encoding != "cdr" or not payloads:
         return None
     some = [payloads[k * (len(payloads) - 1) // 2] for k in range(3)]
-    for name in TWISTS if "twist" in topic.lower() else TOLD:
+    for name in TWISTS if "twist" in topic.lower() else STAMPED:
         try:
             if all(_same(plain(payload, LONGEST), name) for payload in some):
                 return Schema(id=0, data=b"", encoding="", name=name)

@@ -291,11 +291,11 @@ def _sorted(raw: Raw) -> Stream[Any]:
             values = raw.choice.convert(raw.stamp, values)
     hold = pace.hold_of(raw.stamp, values) if raw.role in HELD else None
     if hold:
-        kept = pace.first_of_each(raw.stamp, values, hold)
-        times = f"{len(values) / np.count_nonzero(kept):.0f}"
+        retained = pace.first_of_each(raw.stamp, values, hold)
+        times = f"{len(values) / np.count_nonzero(retained):.0f}"
         raw.notes.append(f"each value is sent {times} times: the repeats are left out")
-        raw.keep(kept)
-        values = values[kept]
+        raw.keep(retained)
+        values = values[retained]
     if raw.lost:
         raw.notes.append(f"lost {_words(raw)}")
     delay = np.median(raw.log - raw.stamp) * 1e-9

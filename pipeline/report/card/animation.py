@@ -102,8 +102,8 @@ class ReleaseFrames:
         draw, release = ImageDraw.Draw(image), self.simulated.release
         clock = f"t = {_milliseconds(time - release)}"
         draw.text((2 * WIDE - 12, 8), clock, fill=INK, font=font(19, bold=True), anchor="ra")
-        told = f"picture of {_milliseconds(self._taken[number] - release)}"
-        draw.text((10, HEAD + TALL - 24), told, fill="white", font=font(13))
+        caption = f"picture of {_milliseconds(self._taken[number] - release)}"
+        draw.text((10, HEAD + TALL - 24), caption, fill="white", font=font(13))
         return image
 
     @staticmethod

@@ -22,7 +22,7 @@ CUT = (520, 470)  # pixels of each camera picture
 MOVED = 0.005  # s after the release: in a picture from then on the band has left the hand
 MOST_SPAN = 1.5  # m of landings on which targets find room for their names
 AROUND = (-0.3, 0.4)  # of the release, magnified [s]
-BARS = "#0072b2"  # beside black and magenta, told apart by any eye
+BARS = "#0072b2"  # beside black and magenta, distinct for any eye
 TITLE = {"fontsize": 11, "fontweight": "bold"}
 KINDS = {"measured": ("o", "measured"), "virtual": ("D", "virtual rig")}
 

@@ -117,8 +117,8 @@ def _cautions(episodes: list[Episode]) -> list[tuple[str, str]]:
         pull = f"pull {source.get('pull', 1)} of {as_code(source['file'])}"
         for one in episode.cautions:
             cure = as_text(one["cure"])
-            told = f"In {pull}, {as_text(one['what'])}.", f"For {pull}: {cure}."
-            found.append(told)
+            sentences = f"In {pull}, {as_text(one['what'])}.", f"For {pull}: {cure}."
+            found.append(sentences)
     return found
 
 

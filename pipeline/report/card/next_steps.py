@@ -87,7 +87,7 @@ def _gains(
     if not unloaded and DIP[0] in model.names:
         yield Gain(
             f"{A_DIP}: {{before}} {{at}} become about {{after}}.",
-            model.after(model.told(*DIP))[aim],
+            model.after(model.explained(*DIP))[aim],
         )
     yield Gain(
         "Record another pull like those that you have: {before} {at} become about {after}.",

@@ -19,22 +19,22 @@ def reasons_of(found: Findings, reasons: list[Reason]) -> list[str]:
     """Sentences: what speaks against; of a trusted band, why it can be trusted."""
     if reasons:
         return [one.text for one in sorted(reasons, key=lambda one: not one.against)]
-    told = [
+    notes = [
         f"The fit settled, and the simulation meets the recording: {_met(found)}.",
         f"Launches stretch the band to {found.stretch:.2f} times its length, within the recorded"
         f" {found.recorded_stretch:.2f}.",
         f"Landings are known to ±{100 * found.half_width:.0f} cm or better.",
     ]
     if found.scores:
-        told.append(inside(found))
+        notes.append(inside(found))
     if not found.unloaded:
-        told.append(
+        notes.append(
             "No recording lets the drawn band back, so that softening keeps its prior: launches"
             " tell what it leaves."
         )
     if found.observed == 1:
-        told.append("One launch is part of the evidence; one is not many.")
-    return told
+        notes.append("One launch is part of the evidence; one is not many.")
+    return notes
 
 
 def _met(found: Findings) -> str:
@@ -125,12 +125,12 @@ def _values(shown: list[ShownValue]) -> str:
     for one in (one for one in shown if not one.fixed):
         interval = "not known" if one.low is None else f"{one.low:g}–{one.high:g}"
         prior = f"{one.prior[0]:g}–{one.prior[1]:g}" if one.prior else "–"
-        prior += "" if one.told else " (**not identified**)"
+        prior += "" if one.identified else " (**not identified**)"
         value = f"{one.value:g} {one.unit}".strip()
         lines.append(f"| {one.label} | {value} | {interval} | {prior} |")
     fixed = ", ".join(f"{one.label} {one.value:g}" for one in shown if one.fixed)
-    told = f"\nFixed, for no pull shows them: {fixed}.\n" if fixed else ""
-    return "\n".join(lines) + "\n" + told
+    notes = f"\nFixed, for no pull shows them: {fixed}.\n" if fixed else ""
+    return "\n".join(lines) + "\n" + notes
 
 
 def _draws(inputs: CardInputs) -> str:
@@ -147,13 +147,13 @@ def _draws(inputs: CardInputs) -> str:
         force = f"{aims.hold_force[row]:.1f} N" if np.isfinite(aims.hold_force[row]) else "–"
         lines.append(f"| {target:g} m | {y:.4f}, {z:.4f} m | {landing} | {interval} | {force} |")
     history = inputs.theta.get("history")
-    asked = ""
+    requested = ""
     if history:
-        asked = (
+        requested = (
             f"\nDraw and wait as in the recording: about {history['pull_time']:.1f} s for the way,"
             f" then {history['pause']:.1f} s. The band remembers.\n"
         )
-    return "\n".join(lines) + "\n" + asked
+    return "\n".join(lines) + "\n" + requested
 
 
 def _rests(inputs: CardInputs) -> str:

@@ -20,7 +20,7 @@ class ShownValue:
     Attributes:
         low, high: None where no interval is known.
         prior: Interval of what is known without the recording; None where it is not.
-        told: The recording says more than that.
+        identified: The recording says more than that.
     """
 
     name: str
@@ -31,7 +31,7 @@ class ShownValue:
     high: float | None
     fixed: bool
     prior: tuple[float, float] | None = None
-    told: bool = True
+    identified: bool = True
 
 
 def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
@@ -54,10 +54,10 @@ def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
         still = name in fixed
         ends = (None if still else known.get(end) for end in ("low", "high"))
         low, high = (None if x is None else rounded(quantity.factor * x) for x in ends)
-        prior, told = known.get("prior"), known.get("identifiable", True)
+        prior, identified = known.get("prior"), known.get("identifiable", True)
         if prior:
             prior = rounded(quantity.factor * prior[0]), rounded(quantity.factor * prior[1])
-        about = quantity.label, quantity.unit, value, low, high, still, prior, told
+        about = quantity.label, quantity.unit, value, low, high, still, prior, identified
         found.append(ShownValue(name, *about))
     return found
 

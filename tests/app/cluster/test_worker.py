@@ -21,12 +21,12 @@ def test_threads_of_a_worker_share_its_cores(monkeypatch) -> None:
 
 def test_the_jobs_of_slurm_are_as_documented(tmp_path: Path) -> None:
     """docs/cluster/jobqueue.yaml by Dask's own configuration, to the script that sbatch gets."""
-    asked = ("tools/slurm.py", "--host", "127.0.0.1", "--script")
-    done = python(*asked, DASK_CONFIG=str(tmp_path))
+    requested = ("tools/slurm.py", "--host", "127.0.0.1", "--script")
+    done = python(*requested, DASK_CONFIG=str(tmp_path))
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
-    asked = "-J sling,-n 1,--cpus-per-task=16,--mem=60G,-t 08:00:00,--gres=gpu:1"
-    assert {f"#SBATCH {directive}" for directive in asked.split(",")} <= {*lines}
+    requested = "-J sling,-n 1,--cpus-per-task=16,--mem=60G,-t 08:00:00,--gres=gpu:1"
+    assert {f"#SBATCH {directive}" for directive in requested.split(",")} <= {*lines}
     assert "export SLING_DEVICE=cuda:0 SLING_WORKERS=4" in lines
     (started,) = (line for line in lines if "distributed.cli.dask_worker" in line)
     assert started.startswith(f"{sys.executable} -m distributed.cli.dask_worker tcp://127.0.0.1:")

@@ -71,8 +71,8 @@ values = st.tuples(st.floats(-3, 3), st.floats(1e-3, 1.0))
 
 
 @given(st.lists(values, min_size=2, max_size=6), st.floats(1e-6, 1e6))
-def test_neither_units_nor_the_direction_of_time_matter(said, unit) -> None:
-    own = [value(*one) for one in said]
+def test_neither_units_nor_the_direction_of_time_matter(message, unit) -> None:
+    own = [value(*one) for one in message]
     found = changes({"e": own})
     assert all(one.chance < FALSE_ALARM and one.earlier < one.later for one in found)
     other = [one.model_copy(update={"value": unit * one.value}) for one in own]

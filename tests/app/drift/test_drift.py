@@ -89,9 +89,9 @@ def test_a_softened_band_is_told_and_one_that_keeps_is_not(lab) -> None:
     assert json.loads((folder / "mine.json").read_text()) == json.loads(json.dumps(content))
     with Image.open(folder / "mine.png") as image:
         assert min(image.size) > 500
-    told = shown(content).splitlines()
-    assert told[3].startswith("2026-06-09") and "x.mcap" in told[3]
-    assert told[-2] == f"identify it anew with the newer recordings: {content['next']}"
+    summary = shown(content).splitlines()
+    assert summary[3].startswith("2026-06-09") and "x.mcap" in summary[3]
+    assert summary[-2] == f"identify it anew with the newer recordings: {content['next']}"
 
 
 def recorded(file: str, begin: int, end: int, deepest: float = 0.4) -> IdentifiedRecording:
@@ -125,7 +125,7 @@ def test_without_a_clock_names_decide(settings, tmp_path, monkeypatch) -> None:
 
 def test_what_had_not_settled_is_left_out(settings, tmp_path, monkeypatch, capsys) -> None:
     soft = ValueOfRecording(value=0.5, low=0.49, high=0.51, deviation=0.01)
-    said = {
+    message = {
         "a": recorded("a.mcap", MAY, MAY + SECOND),
         "b": recorded("b.mcap", MAY + DAY, MAY + DAY + SECOND).model_copy(
             update={"settled": False, "values": dict.fromkeys(recordings.COMPARED, soft)}
@@ -133,7 +133,7 @@ def test_what_had_not_settled_is_left_out(settings, tmp_path, monkeypatch, capsy
         "c": recorded("c.mcap", MAY + 2 * DAY, MAY + 2 * DAY + SECOND),
     }
     files(tmp_path, "abc")
-    monkeypatch.setattr(recordings, "_alone", lambda file, *rest: said[file.stem])
+    monkeypatch.setattr(recordings, "_alone", lambda file, *rest: message[file.stem])
     content = drift(settings, "mine", tmp_path)
     assert content["verdict"] == [SAME]
     assert "b.mcap had not settled" in capsys.readouterr().err
@@ -146,11 +146,11 @@ def test_what_had_not_settled_is_left_out(settings, tmp_path, monkeypatch, capsy
 def test_a_recording_that_stretched_it_further_is_a_change(settings, tmp_path, monkeypatch) -> None:
     """Values alone are the same; 2 mm further are no news."""
     depths = {"a": 0.40, "b": 0.402, "c": 0.44, "d": 0.43}
-    said = {
+    message = {
         name: recorded(f"{name}.mcap", MAY + i * DAY, MAY + i * DAY + SECOND, depth)
         for i, (name, depth) in enumerate(depths.items())
     }
-    monkeypatch.setattr(recordings, "_alone", lambda file, *rest: said[file.stem])
+    monkeypatch.setattr(recordings, "_alone", lambda file, *rest: message[file.stem])
     files(tmp_path, "ab")
     assert drift(settings, "mine", tmp_path)["verdict"] == [SAME]
     files(tmp_path, "cd")
@@ -176,18 +176,18 @@ def test_the_command_names_sizes_that_are_not_the_usual_ones() -> None:
 def test_a_mistake_is_one_line(tmp_path, sling) -> None:
     (tmp_path / "params.yaml").write_text(DEFAULTS.read_text())
 
-    def told(band: str) -> str:
+    def summary(band: str) -> str:
         done = sling("drift", "--band", band, folder=tmp_path)
         assert done.returncode == 1 and done.stdout == ""
         (line,) = (one for one in done.stderr.splitlines() if not one.endswith(" ..."))
         return line
 
-    assert told("none").startswith("error: band none: not in params.yaml")
-    assert "holds no recording, two or more are needed" in told("band1")
+    assert summary("none").startswith("error: band none: not in params.yaml")
+    assert "holds no recording, two or more are needed" in summary("band1")
     (tmp_path / "data/raw/band1").mkdir(parents=True)
     (tmp_path / "data/raw/band1/band1.mcap").write_bytes(b"x")
-    assert "holds one recording" in told("band1")
+    assert "holds one recording" in summary("band1")
     assert not (tmp_path / "reports").exists()
     (tmp_path / "data/raw/band1/band1_2.mcap").write_bytes(b"no recording")
-    assert told("band1").startswith("error: data/raw/band1/band1.mcap: ")
+    assert summary("band1").startswith("error: data/raw/band1/band1.mcap: ")
     assert not (tmp_path / "reports").exists()

@@ -45,10 +45,10 @@ def project(tmp_path, monkeypatch):
     shutil.copy(DEFAULTS, tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("app.preflight.recordings.checked", lambda *given: [])
-    asked, layout = [], Layout(tmp_path)
+    requested, layout = [], Layout(tmp_path)
 
     def dvc(root, arguments, **about):
-        asked.append(arguments)
+        requested.append(arguments)
         band = arguments[1].partition("@")[2]
         layout.card(band).mkdir(parents=True, exist_ok=True)
         (layout.card(band) / "card.json").write_text(json.dumps(CARD | {"band": band}))
@@ -66,7 +66,7 @@ def project(tmp_path, monkeypatch):
     def run(*files, name=None, launches=None, **band) -> dict:
         return module.fit(files, name, module.NewBand(**band), launches, tmp_path)
 
-    return SimpleNamespace(run=run, recording=recording, asked=asked, layout=layout)
+    return SimpleNamespace(run=run, recording=recording, requested=requested, layout=layout)
 
 
 def test_a_new_band_is_added_and_its_card_made(project) -> None:
@@ -75,7 +75,7 @@ def test_a_new_band_is_added_and_its_card_made(project) -> None:
     assert card["band"] == "my_band_2" and card["card"].endswith("bands/my_band_2/README.md")
     about = load().bands["my_band_2"]
     assert (about.mass, about.rest_length, about.diameter) == (0.04, 0.5, 0.01)
-    assert project.asked == [("repro", "own_card@my_band_2")]
+    assert project.requested == [("repro", "own_card@my_band_2")]
     again = project.run(file, mass=0.04, rest_length=0.5)
     assert again == card and load().run.own[-1] == "my_band_2"
     assert project.run(name="my_band_2") == card
@@ -134,7 +134,7 @@ def test_what_is_wrong_is_said_before_anything_changes(project, given, message) 
     with pytest.raises(UserError, match=message):
         project.run(file, **given)
     assert (file.parent / "params.yaml").read_text() == DEFAULTS.read_text()
-    assert project.asked == [] and not project.layout.data.exists()
+    assert project.requested == [] and not project.layout.data.exists()
 
 
 def test_a_band_must_be_known_or_recorded(project) -> None:
@@ -158,11 +158,11 @@ def test_sizes_of_a_known_band_take_the_place_of_the_old_ones(project, capsys) -
     assert f"{path}: bands.a.mass was 0.4, is 0.04 now\n" in capsys.readouterr().err
     assert path.read_text() == first.replace("mass: 0.4\n", "mass: 0.04\n")
     project.run(file, name="a", diameter=0.011, rest_length=0.5)
-    said = capsys.readouterr().err
-    assert "bands.a.diameter was 0.01, is 0.011 now" in said and "rest_length was 0.52" in said
+    output = capsys.readouterr().err
+    assert "bands.a.diameter was 0.01, is 0.011 now" in output and "rest_length was 0.52" in output
     band = load().bands["a"]
     assert (band.mass, band.diameter, band.rest_length) == (0.04, 0.011, 0.5)
-    assert project.asked == [("repro", "own_card@a")] * 3
+    assert project.requested == [("repro", "own_card@a")] * 3
 
 
 def test_sizes_that_cannot_be_or_what_fails_with_them_change_nothing(project, capsys) -> None:
@@ -179,7 +179,7 @@ def test_sizes_that_cannot_be_or_what_fails_with_them_change_nothing(project, ca
             project.run(*files, **given)
         assert path.read_text() == before
     assert "params.yaml: is as it was" in capsys.readouterr().err
-    assert len(project.asked) == 1
+    assert len(project.requested) == 1
 
 
 def test_a_recorded_band_among_those_of_all_methods_is_told(project, capsys) -> None:
@@ -188,7 +188,7 @@ def test_a_recorded_band_among_those_of_all_methods_is_told(project, capsys) -> 
     text = path.read_text().replace("  own:", "  own: []", 1).replace("  - a\n", "", 1)
     path.write_text(text.replace("  - band3\n", "  - band3\n  - a\n", 1))
     project.run(name="a")
-    assert project.asked[-1] == ("repro", "card@a")
+    assert project.requested[-1] == ("repro", "card@a")
     assert "under run.own instead it gets its card alone" in capsys.readouterr().err
 
 
@@ -246,4 +246,4 @@ def test_evidence_that_is_wrong_is_said_before_any_stage(project) -> None:
     (project.layout.evidence / "gone.csv").write_text(LAUNCHES)
     with pytest.raises(UserError, match=r"gone.csv: no band of params.yaml goes by that name"):
         project.run(file, mass=0.04)
-    assert project.asked == []
+    assert project.requested == []

@@ -34,13 +34,13 @@ def serving(
     """`sling ui` in a process, until SIGINT; what it says goes to root/said."""
     with socket.create_server(("127.0.0.1", 0)) as one:
         port = str(one.getsockname()[1])
-    with (root / "said").open("w") as said:
+    with (root / "said").open("w") as message:
         process = subprocess.Popen(
             [sys.executable, "-m", "app.cli", "ui", "--port", port],
             cwd=root,
             env={"PYTHONPATH": str(ROOT), **environment},
-            stdout=said,
-            stderr=said,
+            stdout=message,
+            stderr=message,
         )
     try:
         url = until(lambda: process.poll() is not None or server.address(root))

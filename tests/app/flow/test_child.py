@@ -80,7 +80,7 @@ MISSING = "[Errno 2] No such file or directory: 'missing'"
 
 
 def test_why_a_stage_failed_by_lines_of_dvc() -> None:
-    for said, status, reason in (
+    for message, status, reason in (
         (failed("1", why=f"{RUN} -9"), 255, "was killed by signal 9"),
         (failed("Killed", why=f"{RUN} 137"), 255, "was killed by signal 9"),  # a shell around it
         (failed("Aborted", why=f"{RUN} 134"), 255, "was killed by signal 6"),
@@ -91,7 +91,7 @@ def test_why_a_stage_failed_by_lines_of_dvc() -> None:
         (["Running stage 'x':", "> x.py", "1"], 128 + 9, "DVC was killed by signal 9"),
         (failed("1", why=f"{RUN} -2"), -9, "its guard was killed by signal 9"),
     ):
-        assert child.reason("x", said, status) == reason
+        assert child.reason("x", message, status) == reason
 
 
 def test_lines_come_as_they_are_printed_and_a_cancelled_stage_leaves_nothing(toy: Toy) -> None:

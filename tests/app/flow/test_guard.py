@@ -55,9 +55,9 @@ def test_a_guard_that_says_no_number_leaves_nothing(tmp_path, monkeypatch) -> No
     mute = tmp_path / "mute.py"
     mute.write_text("import sys\nprint('no number', flush=True)\nsys.stdin.read()\n")
     monkeypatch.setattr(guard, "__file__", str(mute))
-    asked = iter(range(3))
+    requested = iter(range(3))
     with child._guarded(
-        ["true"], tmp_path, os.environ, lambda: next(asked, None) is None
+        ["true"], tmp_path, os.environ, lambda: next(requested, None) is None
     ) as process:
         assert process.stdout.read() == ""
     assert process.returncode == 0

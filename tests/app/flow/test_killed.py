@@ -32,7 +32,7 @@ def steps(text: str) -> int:
     return sum("step" in line for line in text.splitlines())
 
 
-def kept(toy: Toy, name: str) -> int:
+def retained(toy: Toy, name: str) -> int:
     """Steps that a stage has behind it."""
     path = toy.folder / ".checkpoints" / name
     return int(path.read_text()) if path.exists() else 0
@@ -50,11 +50,11 @@ def test_flows_are_interrupted_and_killed_and_the_next_one_goes_on(toy: Toy) -> 
     flow.kill()
     flow.wait()
     assert toy.run.left() == []
-    assert "Traceback" not in toy.run.said
-    remaining = sum(STEPS - kept(toy, name) for name in "ab")
+    assert "Traceback" not in toy.run.message
+    remaining = sum(STEPS - retained(toy, name) for name in "ab")
     flow = toy.run.start(*FLOW)
-    assert flow.wait(READY) == 0, toy.run.said
-    assert steps(toy.run.said) == remaining  # from where they were killed
+    assert flow.wait(READY) == 0, toy.run.message
+    assert steps(toy.run.message) == remaining  # from where they were killed
     assert toy.outputs() == OUTPUTS
     assert not temporaries(toy)
     assert toy.dvc("repro") == set()
@@ -62,9 +62,9 @@ def test_flows_are_interrupted_and_killed_and_the_next_one_goes_on(toy: Toy) -> 
 
 def at_work(toy: Toy) -> subprocess.Popen:
     """A flow whose stages run."""
-    before = kept(toy, "a")
+    before = retained(toy, "a")
     flow = toy.run.start(*FLOW)
-    assert wait(lambda: kept(toy, "a") > before + 1, READY), toy.run.said
+    assert wait(lambda: retained(toy, "a") > before + 1, READY), toy.run.message
     return flow
 
 
@@ -73,9 +73,9 @@ def interrupted(toy: Toy, send_to, number: int) -> None:
     send_to(flow.pid, number)
     assert flow.wait(guard.GRACE + 25) == 130
     assert toy.run.left() == []
-    assert "Traceback" not in toy.run.said
-    assert "stages: " not in toy.run.said  # the summary of one that came to its end
-    assert toy.run.said.splitlines()[-1] == "interrupted"
+    assert "Traceback" not in toy.run.message
+    assert "stages: " not in toy.run.message  # the summary of one that came to its end
+    assert toy.run.message.splitlines()[-1] == "interrupted"
     rwlock = toy.folder / ".dvc/tmp/rwlock"  # so that `dvc repro` goes on too
     assert not rwlock.exists() or not any(json.loads(rwlock.read_text()).values())
 

@@ -86,8 +86,8 @@ def test_a_flow_needs_no_prefect(toy: Toy) -> None:
         "print(run(Path.cwd())); assert 'prefect' not in sys.modules"
     )
     assert "stages: 2 ran" in toy("python", "-c", script)
-    said = toy("python", "-c", script)
-    assert re.fullmatch(r"all 6 stages are fresh \(.* s\)\n", said)
+    message = toy("python", "-c", script)
+    assert re.fullmatch(r"all 6 stages are fresh \(.* s\)\n", message)
     assert not (toy.folder / ".prefect").exists()
 
 
@@ -140,9 +140,9 @@ def test_the_ui_shows_runs_that_were_and_the_one_that_is(tmp_path: Path, history
         graph = ask(f"{url}/api", f"/flow_runs/{shown()[0]['id']}/graph-v2")
         nodes = {node["label"]: node for _, node in graph["nodes"]}
         assert [one["id"] for one in nodes["low"]["parents"]] == [nodes["top"]["id"]]
-        said = ask(f"{url}/api", "/logs/filter", {})
+        message = ask(f"{url}/api", "/logs/filter", {})
         assert {"top works", "error: word: says bad; write something else"} <= {
-            one["message"] for one in said
+            one["message"] for one in message
         }
 
 

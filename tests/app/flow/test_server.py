@@ -35,8 +35,14 @@ print(json.dumps(own))
 
 def environment(**more: str) -> dict[str, str]:
     """Of a process that notes its connections; in no continuous integration, as at a user's."""
-    kept = {name: text for name, text in os.environ.items() if name not in ("CI", "GITHUB_ACTIONS")}
-    return {**kept, "PYTHONPATH": os.pathsep.join([str(HERE / "connections"), str(ROOT)]), **more}
+    retained = {
+        name: text for name, text in os.environ.items() if name not in ("CI", "GITHUB_ACTIONS")
+    }
+    return {
+        **retained,
+        "PYTHONPATH": os.pathsep.join([str(HERE / "connections"), str(ROOT)]),
+        **more,
+    }
 
 
 def test_each_setting_is_one_of_prefects(tmp_path: Path) -> None:
@@ -116,10 +122,10 @@ def test_a_server_that_a_full_disk_keeps_from_starting_is_said_so(tmp_path, monk
     (tmp_path / "prefect/__main__.py").write_text("raise SystemExit(1)")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     usage = shutil.disk_usage(tmp_path)
-    for free, said in ((10_000, "No space left on device"), (10**8, "server.log says why")):
+    for free, message in ((10_000, "No space left on device"), (10**8, "server.log says why")):
         found = usage._replace(free=free)
         monkeypatch.setattr(shutil, "disk_usage", lambda _, found=found: found)
-        with pytest.raises(UserError, match=said), server._server(tmp_path, 1):
+        with pytest.raises(UserError, match=message), server._server(tmp_path, 1):
             pass
 
 

@@ -138,9 +138,9 @@ def test_the_bands_own_recording_tells_it_unasked(recorded, tmp_path) -> None:
     assert plan_recording(unknown, "band1", root=tmp_path).base_source is None
     shutil.copy(path, raw / "b.mcap")
     again = plan_recording(unknown, "band1", root=tmp_path)
-    asked = plan_recording(unknown, "band1", recording=path)
+    requested = plan_recording(unknown, "band1", recording=path)
     np.testing.assert_allclose(again.base.translation, plan.base.translation, atol=1e-6)
-    assert (again.frame, again.force.force) == (asked.frame, asked.force.force)
+    assert (again.frame, again.force.force) == (requested.frame, requested.force.force)
     assert again.base_source == f"/tf_static fork <- base of {raw / 'b.mcap'}"
     with pytest.raises(UserError, match="a.mcap: not an MCAP file"):
         plan_recording(unknown, "band1", recording=raw / "a.mcap", root=tmp_path)

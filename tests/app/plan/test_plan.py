@@ -190,8 +190,8 @@ def test_without_a_base_the_plan_is_in_frame_o_and_says_so(params, tmp_path) -> 
     content = json.loads(plan.to_json(files))
     assert (content["frame"], content["base_to_fork"]) == ("fork", None)
     assert content["base_to_fork_source"] is None
-    said = next(line for line in plan.to_text(files).splitlines() if line.startswith("fork  "))
-    assert "nothing says where it stands in the robot's base, so all is in frame O" in said
+    output = next(line for line in plan.to_text(files).splitlines() if line.startswith("fork  "))
+    assert "nothing says where it stands in the robot's base, so all is in frame O" in output
     turned = with_(unknown, "plan", orientation=(0.0, 0.0, 0.0, 1.0))
     with pytest.raises(UserError, match="plan.orientation is the hand's in the robot's base"):
         plan_recording(turned, "band1")
@@ -272,8 +272,8 @@ def test_the_advice_with_dips_and_preconditioning_is_enough(params) -> None:
     dips = with_(params, "plan", dips=(dip(), dip(at=0.7)))
     with pytest.raises(UserError, match="take a smaller --precondition, or take --pull") as error:
         plan_recording(dips, "band1", precondition=2)
-    told = float(str(error.value).split("raise plan.pull_speed to ")[1].split(",")[0])
-    plan_recording(with_(dips, "plan", pull_speed=told), "band1", precondition=2)
+    progress = float(str(error.value).split("raise plan.pull_speed to ")[1].split(",")[0])
+    plan_recording(with_(dips, "plan", pull_speed=progress), "band1", precondition=2)
     with pytest.raises(UserError, match="--precondition: at most 10, got 11"):
         plan_recording(dips, "band1", precondition=11)
 
@@ -298,9 +298,9 @@ def test_a_designed_pull_says_what_it_is_worth(params, tmp_path, monkeypatch) ->
     monkeypatch.setattr(design, "DRAWS", 3)
     monkeypatch.setattr(design, "MOST_DIPS", 1)
     monkeypatch.setattr(design, "REFINED", 6)
-    told = []
-    plan = plan_recording(params, "band1", pull="designed", told=told.append)
-    assert plan.dips == 1 and told[0].startswith("pull 1: 0 dips, ±")
+    progress = []
+    plan = plan_recording(params, "band1", pull="designed", progress=progress.append)
+    assert plan.dips == 1 and progress[0].startswith("pull 1: 0 dips, ±")
     widths = plan.content()["design"]["half_width_m"]
     assert widths["paper"] == widths["plan.dips"]  # which are none here
     assert all(a > 1.5 * b for a, b in zip(widths["paper"], widths["designed"], strict=True))

@@ -37,10 +37,10 @@ def add(project: Path, recording: Path, name: str = "red", **changes) -> str:
 
 def test_a_band_is_added_and_nothing_else_changes(project, seen, blind) -> None:
     before = (project / "params.yaml").read_text().splitlines()
-    said = add(project, seen[0]).splitlines()
-    assert said[0] == "red added, 1 pull"
-    assert said[1].startswith("  seen.mcap: peak force")
-    assert any("pictures come at 15 Hz" in line for line in said[2:])  # what costs accuracy
+    message = add(project, seen[0]).splitlines()
+    assert message[0] == "red added, 1 pull"
+    assert message[1].startswith("  seen.mcap: peak force")
+    assert any("pictures come at 15 Hz" in line for line in message[2:])  # what costs accuracy
     after = (project / "params.yaml").read_text().splitlines()
     lines = [x for x in difflib.ndiff(before, after) if x[0] in "+-"]
     assert len([x for x in lines if x[0] == "-"]) == 1  # run.own

@@ -84,8 +84,8 @@ def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
     write_bag(path, Truth(noise=0.6), rate=500, without=("gripper",), change=edit(wrench=lose))
     report = check_recording(path, with_(params, "setup", max_force=15.0))
     assert report.usable and report.verdict == "can be used, but:"
-    said = {"gripper", "picture_rate", "force_rate", "gap", "pause", "max_force", "noise"}
-    assert said <= abouts(report)
+    output = {"gripper", "picture_rate", "force_rate", "gap", "pause", "max_force", "noise"}
+    assert output <= abouts(report)
     text = report.to_text()
     for caution in report.cautions:
         assert caution.cure and "\n" not in str(caution) and str(caution) in text

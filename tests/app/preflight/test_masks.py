@@ -59,8 +59,8 @@ def test_check_uses_the_masks_beside_the_recording(masked, seen, params, tmp_pat
     content = json.loads(check(masked, chosen, as_json=True, sheet=tmp_path / "a.png")[0])
     usual = json.loads(check(masked, params, as_json=True)[0])
     assert content["problem"] is None and (tmp_path / "a.png").is_file()
-    told = usual["cloud"].pop("told_by_color"), content["cloud"].pop("told_by_color")
-    assert told == (True, False) and content["cloud"] == usual["cloud"]
+    summary = usual["cloud"].pop("told_by_color"), content["cloud"].pop("told_by_color")
+    assert summary == (True, False) and content["cloud"] == usual["cloud"]
     text, status = check(seen[0], chosen)
     assert status == 1 and "there is no such folder of masks" in text
 
@@ -68,12 +68,12 @@ def test_check_uses_the_masks_beside_the_recording(masked, seen, params, tmp_pat
 def test_masks_alone_are_copied_with_their_recording(by_folder, masked, mine) -> None:
     before = (by_folder / "params.yaml").read_bytes()
     lost = next((mine.parent / "masked.masks").glob("1*0.png"))
-    kept = lost.read_bytes()
+    retained = lost.read_bytes()
     lost.unlink()
     with pytest.raises(UserError, match="masks of 1 of 54 pictures are missing"):
         add(by_folder, mine)
     assert content(by_folder) == {"params.yaml": before}
-    lost.write_bytes(kept)
+    lost.write_bytes(retained)
     add(by_folder, mine)
     assert masks(by_folder / "data/raw/red/masked.masks") == masks(masked.with_suffix(".masks"))
     assert sorted(one.name for one in (by_folder / "data/raw/red").iterdir()) == [
@@ -87,8 +87,8 @@ def test_a_further_recording_brings_its_masks(project, by_folder, masked, tmp_pa
     more = tmp_path / "more.mcap"
     joined(more, [masked, masked])  # other bytes, and the first pull's stamps are the same
     shutil.copytree(masked.with_suffix(".masks"), tmp_path / "more.masks")
-    said = add_recording("red", [more], project / "params.yaml", project)
-    assert "1 pull" in said and "pull 2: left out" in said
+    output = add_recording("red", [more], project / "params.yaml", project)
+    assert "1 pull" in output and "pull 2: left out" in output
     assert masks(project / "data/raw/red/more.masks") == masks(tmp_path / "more.masks")
 
 

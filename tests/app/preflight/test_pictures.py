@@ -50,11 +50,11 @@ def test_masks_are_those_of_the_clouds(looked, params) -> None:
 
 def test_a_refused_recording_shows_what_it_has(with_rerun, refused, params, tmp_path) -> None:
     assert not refused.report.usable
-    said = draw_sheet(refused, params, tmp_path / "sheet.png")
-    assert "all that can be shown" in said
+    message = draw_sheet(refused, params, tmp_path / "sheet.png")
+    assert "all that can be shown" in message
     assert cv2.imread(str(tmp_path / "sheet.png")).shape[1] == 1600
-    said = write_timeline(refused, params, tmp_path / "out.rrd")
-    assert "all that can be shown" in said
+    message = write_timeline(refused, params, tmp_path / "out.rrd")
+    assert "all that can be shown" in message
     assert "/raw_force/x" in entities(tmp_path / "out.rrd")
 
 

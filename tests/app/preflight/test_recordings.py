@@ -63,10 +63,10 @@ def test_a_pull_alone_has_nothing_to_rest_from(looked, params) -> None:
 def test_recordings_are_added_to_a_band(project, seen, three) -> None:
     add(project, seen[0])
     before = (project / "params.yaml").read_bytes()
-    said = more(project, three[0]).splitlines()
-    assert said[0] == "red: added to the 1 that were there, 2 pulls"
-    assert said[1].startswith("  three.mcap, pull 1: peak force")
-    assert said[2].startswith("  three.mcap, pull 2: left out, cannot be used: empty mask")
+    message = more(project, three[0]).splitlines()
+    assert message[0] == "red: added to the 1 that were there, 2 pulls"
+    assert message[1].startswith("  three.mcap, pull 1: peak force")
+    assert message[2].startswith("  three.mcap, pull 2: left out, cannot be used: empty mask")
     names = [path.name for path in Layout(project).recordings("red")]
     assert names == ["seen.mcap", "three.mcap"]
     assert (project / "data/raw/red/three.mcap").read_bytes() == three[0].read_bytes()
@@ -102,11 +102,11 @@ def test_a_split_bag_is_checked_and_kept_as_its_folder(project, seen, params, tm
     (parts[0].parent.parent / "july.1.masks").mkdir()
     (parts[0].parent.parent / "july.1.masks" / "17.png").write_bytes(b"mask")
     add(project, parts[0].parent)
-    kept = project / "data/raw/red/july_1"
-    assert Layout(project).recordings("red") == [kept]
-    assert {one.name for one in kept.iterdir()} == {*(p.name for p in parts), "metadata.yaml"}
-    assert (kept.with_name("july_1.masks") / "17.png").read_bytes() == b"mask"
-    for again in (kept, parts[1]):
+    retained = project / "data/raw/red/july_1"
+    assert Layout(project).recordings("red") == [retained]
+    assert {one.name for one in retained.iterdir()} == {*(p.name for p in parts), "metadata.yaml"}
+    assert (retained.with_name("july_1.masks") / "17.png").read_bytes() == b"mask"
+    for again in (retained, parts[1]):
         with pytest.raises(UserError, match="is there already, as .*july_1"):
             more(project, again)
     one = tmp_path / "one"
@@ -120,8 +120,8 @@ def test_a_band_of_several_recordings(project, seen, three) -> None:
     from app.preflight.add_band import add_band
 
     rest = {"mass": 0.0408, "params_path": project / "params.yaml", "root": project}
-    said = add_band("red", [three[0], seen[0]], **rest)
-    assert said.startswith("red added, 3 pulls\n")
+    message = add_band("red", [three[0], seen[0]], **rest)
+    assert message.startswith("red added, 3 pulls\n")
     assert "nothing to do" in add_band("red", [seen[0], three[0]], **rest)
     with pytest.raises(UserError, match="holds other recordings already"):
         add_band("red", [seen[0]], **rest)

@@ -52,11 +52,11 @@ def test_sigkill_and_on_to_the_same_bytes(
     assert inner.count == batches
     for fatal in kills:
         killed = run(*arguments, str(fatal))
-        assert killed.returncode == -signal.SIGKILL, killed.said
+        assert killed.returncode == -signal.SIGKILL, killed.message
         assert not list((tmp_path / "parts").iterdir())
     last = run(*arguments, str(10**6))
-    assert last.returncode == 0, last.said
-    assert int(last.said.splitlines()[-1]) == batches - sum(kills)
+    assert last.returncode == 0, last.message
+    assert int(last.message.splitlines()[-1]) == batches - sum(kills)
     for number, history in enumerate(whole):
         history.save(tmp_path / "whole.parquet")
         left = tmp_path / "parts" / f"{number}.parquet"
@@ -181,8 +181,8 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))
 errors.run(lambda: EvaluationCache(bowl(), Path("memory"), "x")(batches(0.1)[0]) and None)
 """
     done = python("-c", code, folder=tmp_path)
-    said = r"error: memory/x/\w+\.npz: cannot be written \(File too large\)\n"
-    assert re.fullmatch(said, done.stderr)
+    message = r"error: memory/x/\w+\.npz: cannot be written \(File too large\)\n"
+    assert re.fullmatch(message, done.stderr)
     assert done.returncode == 1
     assert not list((tmp_path / "memory" / "x").iterdir())
 

@@ -96,7 +96,7 @@ def test_a_broken_rollout_breaks_no_other() -> None:
 
 
 def test_another_schedule_brings_its_own_filter() -> None:
-    """The filter hangs on the times of the steps, and is kept on the device."""
+    """The filter depends on the times of the steps, and is kept on the device."""
     episode, rollouts = recoiling()
     loss, later = loss_of(episode), type(rollouts)(**vars(rollouts))
     later.times = rollouts.times + np.linspace(0, 0.02, len(rollouts.times))
@@ -144,5 +144,5 @@ def test_terms_of_a_gpu_are_those_of_the_cpu(chamfer: str) -> None:
 
     whole = Evaluator(episode, sling, loss, space, devices=("cuda:0",))(unit)
     some = Evaluator(episode, sling, loss, space, devices=("cuda:0",))(unit[7:10])
-    for name in TERMS:  # simulated and compared there: no rollout hangs on another
+    for name in TERMS:  # simulated and compared there: no rollout depends on another
         np.testing.assert_array_equal(whole.terms[name][7:10], some.terms[name])

@@ -74,15 +74,15 @@ def test_the_number_of_workers_and_devices_changes_nothing() -> None:
 
 def test_devices_share_a_batch_evenly_and_at_once() -> None:
     """Each of two waits for the other, and would do so forever if they took turns."""
-    both, asked = Barrier(2, timeout=60), {}
+    both, requested = Barrier(2, timeout=60), {}
 
     def simulate_on(sling, episode, parameters, device):
-        asked[device] = len(parameters)
+        requested[device] = len(parameters)
         both.wait()
         return simulate(sling, episode, parameters, "cpu")
 
     found = evaluator(devices=("cpu", "cpu:1"), simulate=simulate_on)(np.full((11, 2), 0.5))
-    assert asked == {"cpu": 6, "cpu:1": 5} and np.isfinite(found.total).all()
+    assert requested == {"cpu": 6, "cpu:1": 5} and np.isfinite(found.total).all()
 
 
 def test_what_a_device_raises_is_raised() -> None:

@@ -104,15 +104,23 @@ def test_progress_says_how_far_it_is_and_what_was_recalled(
 ) -> None:
     service = session.service("history", "band1", "de", PARAMS, 12)
     service(UNIT), service(UNIT), service(1 - UNIT)
-    told = [parse(line) for line in capsys.readouterr().err.splitlines()]
+    summary = [parse(line) for line in capsys.readouterr().err.splitlines()]
     least = [
         f"best {3 * min(rosenbrock(x).min() for x in some):.5g}"
         for some in ([UNIT], [UNIT, 1 - UNIT])
     ]
-    assert [step.done for step in told] == [4, 8, 12] and {step.total for step in told} == {12}
-    assert told[0].facts == ("generation 0", least[0], "failed 0/4", "4.0 rollouts/s", "0:02 left")
-    assert told[1].facts == ("generation 1", least[0], "failed 0/4", "recalled", "0:01 left")
-    assert told[2].facts == ("generation 2", least[1], "failed 0/4", "4.0 rollouts/s")
+    assert [step.done for step in summary] == [4, 8, 12] and {step.total for step in summary} == {
+        12
+    }
+    assert summary[0].facts == (
+        "generation 0",
+        least[0],
+        "failed 0/4",
+        "4.0 rollouts/s",
+        "0:02 left",
+    )
+    assert summary[1].facts == ("generation 1", least[0], "failed 0/4", "recalled", "0:01 left")
+    assert summary[2].facts == ("generation 2", least[1], "failed 0/4", "4.0 rollouts/s")
     log = Path("logs/history-band1-de.log").read_text().splitlines()
     assert log[0].endswith("history-band1-de: 12 rollouts")
-    assert [parse(f"history-band1-de {line}") for line in log[1:]] == told
+    assert [parse(f"history-band1-de {line}") for line in log[1:]] == summary

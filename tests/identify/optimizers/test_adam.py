@@ -28,13 +28,13 @@ def test_its_gradient_is_the_functions(place: list[float], step: float) -> None:
     """To the error of a forward difference, step times half the curvature, at the faces too."""
     optimizer = begun(step=step)
     optimizer._x[0].data.copy_(torch.tensor(place, dtype=torch.float64))
-    asked = optimizer.ask()
-    assert asked.min() >= 0
-    assert asked.max() <= 1
-    np.testing.assert_array_equal(asked[0], place)
-    np.testing.assert_allclose(np.abs(asked[1:] - asked[0]), step * np.eye(D), atol=1e-12)
+    requested = optimizer.ask()
+    assert requested.min() >= 0
+    assert requested.max() <= 1
+    np.testing.assert_array_equal(requested[0], place)
+    np.testing.assert_allclose(np.abs(requested[1:] - requested[0]), step * np.eye(D), atol=1e-12)
     optimizer._steepest = optimizer._worst = np.inf
-    optimizer.tell(value(asked))
+    optimizer.tell(value(requested))
     exact = 2 * MATRIX @ (np.array(place) - CENTRE)
     found = optimizer._x[0].grad
     bound = step * np.diag(MATRIX) * (1 + 1e-6) + 1e-9
@@ -50,9 +50,9 @@ def test_its_steps_are_torchs() -> None:
     x = torch.tensor(first[np.argmin(first @ slope)], requires_grad=True)
     adam = torch.optim.Adam([x], lr=0.02)
     for number in range(20):
-        asked = optimizer.ask()
-        np.testing.assert_allclose(asked[0], x.detach().numpy(), atol=1e-9)
-        optimizer.tell(asked @ slope)
+        requested = optimizer.ask()
+        np.testing.assert_allclose(requested[0], x.detach().numpy(), atol=1e-9)
+        optimizer.tell(requested @ slope)
         adam.param_groups[0]["lr"] = 0.02 * (1 + np.cos(np.pi * (number + 1) / 20)) / 2
         x.grad = torch.from_numpy(slope)
         adam.step()

@@ -109,10 +109,10 @@ def test_greedy_takes_what_adds_most() -> None:
 def test_neither_units_nor_the_size_of_an_outlier_matter(loss, outlier: float) -> None:
     """An outlier counts no more than a bad loss, however huge it is."""
     loss = loss.round(9)  # of differences near 1e-160 the squares are no numbers any more
-    told = standardised(np.append(loss, outlier))
-    np.testing.assert_allclose(told, standardised(np.append(loss, 10 * outlier)), atol=1e-9)
-    assert abs(told.mean()) < 1e-9
-    assert told.std(ddof=1) == pytest.approx(1) or np.ptp(told) < 1e-9
+    summary = standardised(np.append(loss, outlier))
+    np.testing.assert_allclose(summary, standardised(np.append(loss, 10 * outlier)), atol=1e-9)
+    assert abs(summary.mean()) < 1e-9
+    assert summary.std(ddof=1) == pytest.approx(1) or np.ptp(summary) < 1e-9
     loss = np.random.default_rng(1).lognormal(0, 3, 50)
     np.testing.assert_allclose(standardised(7 * loss - 3), standardised(loss), atol=1e-12)
 

@@ -65,14 +65,14 @@ def test_its_points_are_those_of_scipy(
     rollouts = population * (generations + 1)
     one = Evolution(dimension, rollouts=rollouts, seed=seed, population=population, **shared)
     for unit in expected:
-        asked = one.ask()
-        np.testing.assert_array_equal(asked, unit)
-        one.tell(((asked - 0.3) ** 2).sum(axis=1))
+        requested = one.ask()
+        np.testing.assert_array_equal(requested, unit)
+        one.tell(((requested - 0.3) ** 2).sum(axis=1))
 
 
 def test_its_first_generation_has_one_agent_in_each_stratum() -> None:
-    asked = Evolution(5, rollouts=48, seed=4, population=24).ask()
-    strata = np.sort(np.floor(asked * 24).astype(int), axis=0)
+    requested = Evolution(5, rollouts=48, seed=4, population=24).ask()
+    strata = np.sort(np.floor(requested * 24).astype(int), axis=0)
     np.testing.assert_array_equal(strata, np.tile(np.arange(24)[:, None], 5))
 
 
@@ -82,9 +82,9 @@ def small(population: int = 5, **more) -> Evolution:
 
 def test_no_thread_is_left() -> None:
     """Dropped before it was asked, in the middle, and after its budget."""
-    for told in (0, 1, 3):
+    for summary in (0, 1, 3):
         one = small()
-        for _ in range(told):
+        for _ in range(summary):
             one.tell(rosenbrock(one.ask()))
         assert threads()
         del one

@@ -18,9 +18,9 @@ def test_first_candidates_follow_the_region() -> None:
     factor = np.array([[0.04, 0, 0], [0.03, 0.02, 0], [0, -0.01, 0.03]])
     sigma = factor @ factor.T
     mu = np.array([0.4, 0.5, 0.6])
-    asked = Solver(Region(mu, sigma, 1.0, []), population=4000, seed=3).ask()
-    np.testing.assert_allclose(asked.mean(axis=0), mu, atol=0.003)
-    np.testing.assert_allclose(np.cov(asked, rowvar=False), sigma, atol=1.5e-4)
+    requested = Solver(Region(mu, sigma, 1.0, []), population=4000, seed=3).ask()
+    np.testing.assert_allclose(requested.mean(axis=0), mu, atol=0.003)
+    np.testing.assert_allclose(np.cov(requested, rowvar=False), sigma, atol=1.5e-4)
 
 
 def balls(*centres: float, size: float = 0.01, dimension: int = 3) -> list[Region]:

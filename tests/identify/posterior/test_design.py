@@ -81,10 +81,10 @@ def test_the_bands_hold_the_force_that_is_told(small) -> None:
 def test_a_pull_tells_and_a_dip_tells_more(small) -> None:
     before, paper, dip = small.before, small.variances(()), small.variances(ONE_DIP)
     assert np.all(paper < before) and np.all(dip < paper)
-    told = small.information(ONE_DIP)
-    assert np.all(np.linalg.eigvalsh(told) > -1e-6 * np.abs(told).max())
+    summary = small.information(ONE_DIP)
+    assert np.all(np.linalg.eigvalsh(summary) > -1e-6 * np.abs(summary).max())
     silent = [small.coordinates.names.index(name) for name in ("air_drag", "log_returned_share")]
-    assert np.all(told[:, silent] == 0)
+    assert np.all(summary[:, silent] == 0)
 
 
 class Toy:

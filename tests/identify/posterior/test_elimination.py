@@ -139,18 +139,18 @@ def test_tolerances_are_the_episodes_own_or_as_usual():
     usual = Tolerances()
     delays = {"camera": {"error": 3e-4}, "pose": {"error": 4e-4}}
     about = {"preprocessing": {"release_error": 5e-4, "delays": delays}}
-    told = Tolerances.of(SimpleNamespace(metadata=about))
-    assert (told.release, told.pose) == (5e-4, 4e-4)
-    assert told.simulated == pytest.approx([5e-4, 5e-4, usual.hand])
+    summary = Tolerances.of(SimpleNamespace(metadata=about))
+    assert (summary.release, summary.pose) == (5e-4, 4e-4)
+    assert summary.simulated == pytest.approx([5e-4, 5e-4, usual.hand])
     delays = {"camera": {"error": None, "left": 3e-3}, "pose": {"error": 4e-4, "left": 4e-3}}
     delays["camera"]["against"] = "force"
-    told = Tolerances.of(SimpleNamespace(metadata={"preprocessing": {"delays": delays}}))
-    assert (told.camera, told.pose) == (3e-3, 4e-3)
+    summary = Tolerances.of(SimpleNamespace(metadata={"preprocessing": {"delays": delays}}))
+    assert (summary.camera, summary.pose) == (3e-3, 4e-3)
     delays = {"camera": {"left": 3e-4}, "pose": {"left": 4e-4, "against": "release"}}
-    told = Tolerances.of(
+    summary = Tolerances.of(
         SimpleNamespace(metadata={"preprocessing": {"release_error": 3e-4, "delays": delays}})
     )
-    assert (told.camera, told.pose) == pytest.approx((5e-4, 5e-4)) and told.release < 1e-4
+    assert (summary.camera, summary.pose) == pytest.approx((5e-4, 5e-4)) and summary.release < 1e-4
     for empty in ({}, {"preprocessing": {"delays": None}}, {"preprocessing": {"delays": {}}}):
         assert Tolerances.of(SimpleNamespace(metadata=empty)) == usual
 

@@ -43,7 +43,7 @@ def test_a_bound_holds_the_mode_and_the_others_give_way(monkeypatch):
     found = fit(seen, box, START)
     assert found.settled and found.phi[2] == 0.0 and found.gradient[2] < 0
     assert away(found, least(seen, box, START)) < 0.05
-    assert all(np.all(phi >= 0) for phi in seen[0].asked)
+    assert all(np.all(phi >= 0) for phi in seen[0].requested)
 
 
 def test_samples_lie_around_the_mode_and_fall_off_from_a_bound():
@@ -89,12 +89,15 @@ def test_a_step_into_failure_is_taken_shorter():
     """From START the first step goes where the simulation fails; the minimum does not."""
     free = curves(1)
     fit(free, space(), START)
-    first = free[0].asked[1]
+    first = free[0].requested[1]
     seen = curves(1, fails=lambda phi: np.allclose(phi, first, atol=0.2 * SIZE))
     found = fit(seen, space(), START)
     assert away(found, least(seen, space(), START)) < 0.05
-    assert np.allclose(seen[0].asked[1], first) and len(seen[0].asked) > len(free[0].asked) - 1
-    went, goes = (np.linalg.norm((seen[0].asked[k] - START) / SIZE) for k in (1, 2))
+    assert (
+        np.allclose(seen[0].requested[1], first)
+        and len(seen[0].requested) > len(free[0].requested) - 1
+    )
+    went, goes = (np.linalg.norm((seen[0].requested[k] - START) / SIZE) for k in (1, 2))
     assert goes < 0.8 * went  # at once, not by and by
 
 
@@ -122,22 +125,22 @@ def test_bins_are_kept_after_the_first_iterations(monkeypatch):
     monkeypatch.setattr(module, "STILL", 0.0)
     seen = curves(1)
     fit(seen, space(), START)
-    assert seen[0].kept[:BINNED] == [None] * BINNED and BINNED in seen[0].kept[BINNED:]
-    assert None not in seen[0].kept[BINNED:]
+    assert seen[0].retained[:BINNED] == [None] * BINNED and BINNED in seen[0].retained[BINNED:]
+    assert None not in seen[0].retained[BINNED:]
 
 
 def test_no_step_is_longer_than_said(monkeypatch):
     monkeypatch.setattr(module, "LONGEST", 1.0)
     seen = curves(1)
     fit(seen, space(), START)
-    moved = np.abs(np.diff(seen[0].asked[: BINNED + 1], axis=0)) / SIZE
+    moved = np.abs(np.diff(seen[0].requested[: BINNED + 1], axis=0)) / SIZE
     assert moved.max() == pytest.approx(1.0)
 
 
 def test_progress_tells_of_each_nearer_expansion():
-    told = []
-    found = fit(curves(1), space(), START, progress=told.append)
-    assert told[-1].misfit == found.misfit and told[0].misfit > 10 * found.misfit
+    summary = []
+    found = fit(curves(1), space(), START, progress=summary.append)
+    assert summary[-1].misfit == found.misfit and summary[0].misfit > 10 * found.misfit
 
 
 def test_finite_differences_stay_within_the_upper_bounds():
@@ -151,11 +154,11 @@ def test_without_a_recording_is_a_fit_without_it():
     seen, box = curves(3), space()
     found, refit = fit(seen, box, START), fit(seen[1:], box, START)
     spread = np.sqrt(np.diag(np.linalg.inv(refit.hessian)))
-    told = without(SimpleNamespace(fit=found, coordinates=box), 0)
-    moved = np.array(list(told["moved"].values()))
+    summary = without(SimpleNamespace(fit=found, coordinates=box), 0)
+    moved = np.array(list(summary["moved"].values()))
     np.testing.assert_allclose(moved, (refit.phi - found.phi) / spread, atol=0.1)
     there = seen[0].expand(None, refit.phi, None, None, None).misfit
-    assert told["misfit"] == pytest.approx(there - found.expansions[0].misfit, abs=0.3)
+    assert summary["misfit"] == pytest.approx(there - found.expansions[0].misfit, abs=0.3)
 
 
 def test_disagreement_is_one_of_alike_recordings_and_grows_with_a_shift():

@@ -109,9 +109,9 @@ def test_intervals_hold_the_truth_and_two_recordings_narrow_them(first, both):
 
 
 def test_alike_recordings_agree(both):
-    told = told_of(both)
-    assert told["disagreement"] == both.birge == 1.0
-    assert len(told["recordings"]) == 2 and "without_it" in told["recordings"][0]
+    summary = told_of(both)
+    assert summary["disagreement"] == both.birge == 1.0
+    assert len(summary["recordings"]) == 2 and "without_it" in summary["recordings"][0]
 
 
 def test_what_is_written_is_a_theta_file(first, tmp_path):

@@ -17,7 +17,7 @@ DRAW, FURTHER = (-0.30, -0.17), 1.04
 
 
 @pytest.fixture(scope="module")
-def told(params):
+def summary(params):
     """Coordinates, where they stand, and what was known and is with launches from DRAW."""
     rough = with_(params, "sling", **ROUGH)
     sling = load_sling(rough, "band1", "nowhere", "rubber")
@@ -38,15 +38,15 @@ def told(params):
     return coordinates.names, known, by
 
 
-def test_a_longer_launch_gives_back_more_or_loses_less(told) -> None:
-    names, _, by = told
+def test_a_longer_launch_gives_back_more_or_loses_less(summary) -> None:
+    names, _, by = summary
     moved = dict(zip(names, np.linalg.solve(*by(1)), strict=True))
     assert moved["log_returned_share"] > 0
     assert moved[names[1]] < 0  # the loss factor
 
 
-def test_two_launches_narrow_what_one_leaves_open(told) -> None:
-    names, known, by = told
+def test_two_launches_narrow_what_one_leaves_open(summary) -> None:
+    names, known, by = summary
     one, two = (np.linalg.inv(by(count)[0]) for count in (1, 2))
     place = names.index("log_returned_share")
     assert two[place, place] < one[place, place] < 1 / known[place, place]

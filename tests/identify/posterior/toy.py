@@ -37,11 +37,11 @@ class Curve:
 
     def __init__(self, seen: np.ndarray, sigma: float = 0.1, fails=lambda phi: False) -> None:
         self.seen, self.sigma, self.fails = seen, sigma, fails
-        self.episode, self.kept, self.asked = SimpleNamespace(band="toy"), [], []
+        self.episode, self.retained, self.requested = SimpleNamespace(band="toy"), [], []
 
     def expand(self, points, phi, steps, nuisances, pool, residuals=None) -> SimpleNamespace:
-        self.kept.append(residuals)
-        self.asked.append(phi)
+        self.retained.append(residuals)
+        self.requested.append(phi)
         if self.fails(phi):
             raise Failed("it broke")
         left, design = (self.seen - curve(phi)) / self.sigma, slopes(phi) / self.sigma
@@ -50,7 +50,7 @@ class Curve:
             hessian=design @ design.T,
             gradient=design @ left,
             nuisances=(np.zeros(3), np.zeros((3, 3))),
-            residuals=len(self.kept),
+            residuals=len(self.retained),
         )
 
 

@@ -44,11 +44,11 @@ def test_the_minimum_of_a_correlated_quadratic_is_found() -> None:
 
 def test_everything_evaluated_is_recorded_inside_the_box() -> None:
     """With the minimum in a corner, most candidates of CMA-ES fall outside and are reflected."""
-    asked = []
+    requested = []
     inner = quadratic(np.zeros(5), np.eye(5))
-    explored, refined, regions = chain(lambda unit: (asked.append(unit), inner(unit))[1])
+    explored, refined, regions = chain(lambda unit: (requested.append(unit), inner(unit))[1])
     rows = np.concatenate([explored.unit, refined.unit])
-    np.testing.assert_array_equal(rows, np.concatenate(asked))
+    np.testing.assert_array_equal(rows, np.concatenate(requested))
     assert rows.min() >= 0 and rows.max() <= 1
     columns = refined.table.to_pydict()
     assert set(columns["phase"]) == {"cma"} and len(regions) == 5
@@ -72,13 +72,13 @@ class Recorder:
     phase = "recorder"
 
     def __init__(self, *sizes: int) -> None:
-        self._sizes, self.told = iter(sizes), []
+        self._sizes, self.summary = iter(sizes), []
 
     def ask(self) -> np.ndarray:
         return np.full((next(self._sizes), 5), 0.5)
 
     def tell(self, losses: np.ndarray) -> None:
-        self.told.append(losses)
+        self.summary.append(losses)
 
 
 @given(sizes=st.lists(st.integers(1, 9), min_size=1, max_size=9), data=st.data())
@@ -89,7 +89,7 @@ def test_exactly_the_budget_is_spent(sizes: list[int], data: st.DataObject) -> N
     search(one, quadratic(CENTRE, np.eye(5)), history, rollouts=rollouts)
     assert len(history.total) == rollouts
     whole = [size for size, end in zip(sizes, np.cumsum(sizes), strict=True) if end <= rollouts]
-    assert [len(losses) for losses in one.told] == whole
+    assert [len(losses) for losses in one.summary] == whole
     generation = np.repeat(np.arange(len(sizes)), sizes)[:rollouts]
     assert history.table["generation"].to_pylist() == generation.tolist()
 
@@ -99,7 +99,7 @@ def test_failed_points_are_told_as_twice_the_worst_so_far() -> None:
     evaluate = Evaluate(lambda unit: next(values), fails=lambda unit: np.arange(len(unit)) == 1)
     one = Recorder(3, 2, 2)
     search(one, evaluate, History("toy", NAMES), rollouts=7)
-    assert [losses.tolist() for losses in one.told] == [[1.0, 6.0, 3.0], [2.0, 6.0], [4.0, 8.0]]
+    assert [losses.tolist() for losses in one.summary] == [[1.0, 6.0, 3.0], [2.0, 6.0], [4.0, 8.0]]
 
 
 def test_fixed_axes_keep_their_physical_values() -> None:

@@ -82,8 +82,8 @@ def test_a_method_may_ask_for_regions_of_its_own() -> None:
     found = []
     for k_top, covariance, count in ((None, True, 4), (2, False, 2)):
         about = SimpleNamespace(k_top=k_top, covariance=covariance)
-        regions, asked = module.regions_of(about, optimizer, history)
-        assert len(regions) == asked == count
+        regions, requested = module.regions_of(about, optimizer, history)
+        assert len(regions) == requested == count
         found.append(regions)
     for ellipsoid, ball in zip(*found, strict=False):
         np.testing.assert_array_equal(ball.mu, ellipsoid.mu)

@@ -56,9 +56,9 @@ def test_names_are_of_rows(checked) -> None:
 def test_what_is_lost_is_said_once(checked) -> None:
     note = "no checksums in the file: damage to its messages would not be noticed"
     odd = with_recording(checked, notes=[note], losses=["a chunk is damaged", "another is"])
-    said = list(container.findings(odd))
-    assert [one.about for one in said] == ["checksums", "losses"]
-    assert said[1].what == "2 things were lost or mended, first of all: a chunk is damaged"
+    message = list(container.findings(odd))
+    assert [one.about for one in message] == ["checksums", "losses"]
+    assert message[1].what == "2 things were lost or mended, first of all: a chunk is damaged"
 
 
 @pytest.mark.fires("noise", "drift", "release", "slip", "turn", "lead_in")
@@ -75,10 +75,10 @@ def test_facts_of_the_signals_tell(checked) -> None:
 
 @pytest.mark.fires("delay")
 def test_delays_that_the_recording_shows_are_said(checked) -> None:
-    for late, error, said in ((0.012, 0.001, True), (0.012, 0.005, False), (0.001, 1e-4, False)):
+    for late, error, message in ((0.012, 0.001, True), (0.012, 0.005, False), (0.001, 1e-4, False)):
         pose = Estimate(late, error, "estimated", applied=True)
         odd = replace(checked, delays=replace(checked.delays, pose=pose))
-        assert ("delay" in abouts(times.findings(odd))) == said
+        assert ("delay" in abouts(times.findings(odd))) == message
 
 
 @pytest.mark.fires("clock")
@@ -90,11 +90,11 @@ def test_times_of_receipt_tell_of_another_clock(checked) -> None:
         {0.045: True, -0.06: False, -0.2: True},
     )
     for role, cases in (("pose", poses), ("color", seen)):
-        for offset, said in cases.items():
+        for offset, message in cases.items():
             stream = replace(getattr(recording, role), delay=recording.wrench.delay - offset)
             found = times.findings(with_recording(checked, **{role: stream}))
             words = [one.what for one in found if one.about == "clock"]
-            assert len(words) == said and all(f"{offset:+.3f} s" in what for what in words)
+            assert len(words) == message and all(f"{offset:+.3f} s" in what for what in words)
 
 
 @pytest.mark.fires("empty", "damaged", "unpaired", "coverage")
@@ -111,8 +111,8 @@ def test_pictures_without_a_band_are_said(checked) -> None:
 @pytest.mark.fires("unseen")
 def test_a_camera_that_stops_before_the_release_is_said(checked) -> None:
     rows = [row for row in checked.coverage if row.phase in ("hanging", "held", "drawn")]
-    said = [one.what for one in pictures.of_coverage(rows) if one.about == "unseen"]
-    assert said == [f"no picture shows how the band {how}" for how in ("recoils", "swings")]
+    message = [one.what for one in pictures.of_coverage(rows) if one.about == "unseen"]
+    assert message == [f"no picture shows how the band {how}" for how in ("recoils", "swings")]
 
 
 @pytest.mark.fires("drawn")
@@ -127,20 +127,22 @@ def test_a_band_that_is_never_taut_refuses(checked) -> None:
 def test_a_sensor_that_tf_static_does_not_know_is_said(checked) -> None:
     assert not list(frames.findings(checked))
     wrench = replace(checked.pull.recording.wrench, frame="elsewhere")
-    (said,) = frames.findings(with_recording(checked, wrench=wrench))
-    assert said.about == "sensor" and "'elsewhere'" in said.what
+    (message,) = frames.findings(with_recording(checked, wrench=wrench))
+    assert message.about == "sensor" and "'elsewhere'" in message.what
 
 
 @pytest.mark.fires("extrinsics", "hand")
 def test_tips_are_off_from_what_one_component_is_sure_of(checked) -> None:
     assert not abouts(camera.findings(checked))
     assert "extrinsics" in abouts(camera.findings(with_results(checked, tips=None)))
-    for off, error, said in ((0.0039, 0.0001, 0), (0.0045, 0.0014, 0), (0.0045, 0.0012, 1)):
+    for off, error, message in ((0.0039, 0.0001, 0), (0.0045, 0.0014, 0), (0.0045, 0.0012, 1)):
         offsets, errors = np.zeros((2, 3)), np.full((2, 3), error)
         offsets[0, 0] = off
         offsets[:, 2], errors[:, 2] = 0.02, 0.01  # the least certain direction says nothing
         tips = replace(checked.tips, offsets=offsets, errors=errors)
-        assert ("extrinsics" in abouts(camera.findings(with_results(checked, tips=tips)))) == said
+        assert (
+            "extrinsics" in abouts(camera.findings(with_results(checked, tips=tips)))
+        ) == message
     away = replace(checked.tips, hand=np.array([0.0, 0.05, 0.0]))
     assert "hand" in abouts(camera.findings(with_results(checked, tips=away)))
 
@@ -150,8 +152,8 @@ def test_a_lens_that_explains_what_is_off_is_said(checked) -> None:
     offsets = checked.tips.offsets + [0.02, 0.0, 0.0]
     for kind in ("depth", "width"):
         tips = replace(checked.tips, offsets=offsets, lens=LensFactor(kind, 1.02, 0.001))
-        said = [*camera.findings(with_results(checked, tips=tips))]
-        assert abouts(said) == {"lens"} and "1.020 ± 0.001" in said[0].what
+        message = [*camera.findings(with_results(checked, tips=tips))]
+        assert abouts(message) == {"lens"} and "1.020 ± 0.001" in message[0].what
 
 
 def test_the_pause_before_the_release(checked, seen) -> None:
@@ -177,27 +179,29 @@ def test_a_step_that_fails_refuses_and_is_the_last_finding(checked) -> None:
 def test_lost_and_rare_messages_are_said(checked) -> None:
     recording = checked.pull.recording
 
-    def said(role: str, kept: np.ndarray) -> set[str]:
+    def message(role: str, retained: np.ndarray) -> set[str]:
         stream = getattr(recording, role)
-        kept = kept[: len(stream.stamp)]
+        retained = retained[: len(stream.stamp)]
         values = stream.values
-        values = [values[i] for i in np.flatnonzero(kept)] if role == "depth" else values[kept]
-        thinned = replace(stream, stamp=stream.stamp[kept], values=values)
+        values = (
+            [values[i] for i in np.flatnonzero(retained)] if role == "depth" else values[retained]
+        )
+        thinned = replace(stream, stamp=stream.stamp[retained], values=values)
         return abouts(rates.findings(with_recording(checked, **{role: thinned})))
 
     number = np.arange(len(recording.wrench.stamp))
     as_made = abouts(rates.findings(checked))
-    assert said("wrench", (number < 1000) | (number > 1040)) - as_made == {"gap"}
-    assert said("wrench", number % 15 != 3) - as_made == {"missing"}
-    assert said("wrench", number % 2 == 0) - as_made == {"force_rate"}
-    assert "picture_rate" in said("depth", number % 2 == 0)
+    assert message("wrench", (number < 1000) | (number > 1040)) - as_made == {"gap"}
+    assert message("wrench", number % 15 != 3) - as_made == {"missing"}
+    assert message("wrench", number % 2 == 0) - as_made == {"force_rate"}
+    assert "picture_rate" in message("depth", number % 2 == 0)
 
 
 @pytest.mark.fires("topics")
 def test_another_topic_that_would_do_is_said(checked) -> None:
     doubts = {"wrench": "/left/wrench would do as well"}
-    (said,) = roles.findings(with_recording(checked, doubts=doubts))
-    assert said.about == "topics" and said.what.endswith("but /left/wrench would do as well")
+    (message,) = roles.findings(with_recording(checked, doubts=doubts))
+    assert message.about == "topics" and message.what.endswith("but /left/wrench would do as well")
 
 
 @pytest.mark.fires("gripper")
@@ -246,7 +250,7 @@ def test_no_check_fires_on_a_sound_recording(name: str) -> None:
 def test_a_clock_that_runs_fast_is_said(checked) -> None:
     """By the growth of log_time less stamp; one that scatters as much says nothing."""
     pose = checked.pull.recording.pose
-    for rate, error, said in (
+    for rate, error, message in (
         (2e-3, 1e-5, "taken out"),
         (2e-3, 3e-4, "not steady enough"),
         (2e-3, 1e-3, ""),
@@ -254,19 +258,19 @@ def test_a_clock_that_runs_fast_is_said(checked) -> None:
     ):
         odd = with_recording(checked, pose=replace(pose, drift=ClockRate(rate, error, 4.0)))
         words = [one.what for one in times.findings(odd) if one.about == "clock_drift"]
-        assert any(pose.topic in what and "+2000" in what for what in words) == bool(said)
-        assert all(said in what for what in words)
+        assert any(pose.topic in what and "+2000" in what for what in words) == bool(message)
+        assert all(message in what for what in words)
 
 
 @pytest.mark.fires("clock_unknown")
 def test_a_pose_that_nothing_ties_to_the_force_is_said(checked) -> None:
-    for left, said in ((0.003, True), (0.001, False), (None, False)):
+    for left, message in ((0.003, True), (0.001, False), (None, False)):
         odd = replace(checked, delays=replace(checked.delays, pose=Estimate(left=left)))
-        assert ("clock_unknown" in abouts(times.findings(odd))) == said
+        assert ("clock_unknown" in abouts(times.findings(odd))) == message
 
 
 @pytest.mark.fires("clocks_disagree")
 def test_two_estimates_of_a_delay_that_disagree_are_said(checked) -> None:
     odd = replace(checked, delays=replace(checked.delays, conflict="one says 3 ms, one -9 ms"))
-    said = [one.what for one in times.findings(odd) if one.about == "clocks_disagree"]
-    assert said == ["one says 3 ms, one -9 ms"]
+    message = [one.what for one in times.findings(odd) if one.about == "clocks_disagree"]
+    assert message == ["one says 3 ms, one -9 ms"]

@@ -43,10 +43,10 @@ def test_a_sound_force_is_left(checked) -> None:
 @pytest.mark.parametrize("axis", ["x", "z"])
 @pytest.mark.parametrize("degrees", [-28, -15, -6, 6, 15, 28])
 def test_a_turned_sensor(checked, axis, degrees) -> None:
-    said = [one for one in found(turned(checked, axis, degrees)) if one.about == "direction"]
-    assert len(said) == 1 and said[0].refused == (abs(degrees) > 12)
+    message = [one for one in found(turned(checked, axis, degrees)) if one.about == "direction"]
+    assert len(message) == 1 and message[0].refused == (abs(degrees) > 12)
     way = {"x": ("presses down", "lifts"), "z": ("to the right", "to the left")}[axis]
-    assert way[degrees > 0] in said[0].what
+    assert way[degrees > 0] in message[0].what
 
 
 @pytest.mark.fires("range")
@@ -62,9 +62,9 @@ def test_a_range_that_ends(checked, share) -> None:
         values[:, k] = np.clip(values[:, k], rest[k] - most, rest[k] + most)
         return values
 
-    said = found(with_force(checked, clipped))
-    assert [one.about for one in said if one.refused][0] == "range"
-    assert "its range ends" in said[0].what
+    message = found(with_force(checked, clipped))
+    assert [one.about for one in message if one.refused][0] == "range"
+    assert "its range ends" in message[0].what
 
 
 @pytest.mark.parametrize("every", [1, 20])
@@ -84,8 +84,8 @@ def test_units(checked) -> None:
         (1e-3, "millinewtons", True),
         (9.81, "kilograms-force", False),
     ):
-        said = found(with_force(checked, lambda _, values, by=newtons: values / by))
-        units = [one for one in said if one.about == "units"]
+        message = found(with_force(checked, lambda _, values, by=newtons: values / by))
+        units = [one for one in message if one.about == "units"]
         assert units and units[0].refused == refused and name in units[0].what
     with pytest.raises(UserError, match="is it in kilonewtons"):
         _ = with_force(checked, lambda _, values: values / 1e3).pull.release
@@ -114,8 +114,8 @@ def test_zeros_are_named(checked) -> None:
     for share, refused in ((0.05, False), (0.2, True)):
         off = share * hold_force / np.sqrt(3)
         odd = with_force(checked, lambda t, x, by=off: x + by * (t > release + 0.01)[:, None])
-        (said,) = (one for one in found(odd) if one.about == "zero")
-        assert said.refused == refused and "after the release" in said.what
+        (message,) = (one for one in found(odd) if one.about == "zero")
+        assert message.refused == refused and "after the release" in message.what
     assert "jump" in abouts(force.findings(with_facts(checked, jumps=[0.1])))
 
 

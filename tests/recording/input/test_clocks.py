@@ -60,13 +60,13 @@ def test_a_good_file_is_never_mended(rate, seed, jitter, stalls, lost, log_step,
         log = stall(log, at, seconds)
     half = len(log) // 2
     log[half:] += round(1e9 * (log_step + slower))
-    kept = np.ones(len(stamp), bool)
+    retained = np.ones(len(stamp), bool)
     for share, part in lost:
         first = int(share * len(stamp))
-        kept[first : first + int(part * len(stamp))] = False
+        retained[first : first + int(part * len(stamp))] = False
     if log_step:  # a gap just there, as long as that step, would be a step of the stamps
-        kept[half - int(2 * rate) : half + int(2 * rate)] = True
-    stamp, log = stamp[kept], log[kept]
+        retained[half - int(2 * rate) : half + int(2 * rate)] = True
+    stamp, log = stamp[retained], log[retained]
     if len(stamp) < 20:
         return
     order = clocks.arrival(stamp, log)
@@ -97,11 +97,11 @@ def test_a_step_where_messages_were_lost_and_the_recorder_stalled() -> None:
     log = stall(log, 2.99, 0.2)
     stamp = true.copy()
     stamp[3000:] += 700 * MS
-    kept = np.ones(len(true), bool)
-    kept[2995:3005] = False
-    (step,) = clocks.steps(stamp[kept], log[kept])
-    mended = clocks.without(stamp[kept], [step])
-    assert np.abs(mended - true[kept]).max() < 3 * MS  # the stall hides how many were lost
+    retained = np.ones(len(true), bool)
+    retained[2995:3005] = False
+    (step,) = clocks.steps(stamp[retained], log[retained])
+    mended = clocks.without(stamp[retained], [step])
+    assert np.abs(mended - true[retained]).max() < 3 * MS  # the stall hides how many were lost
 
 
 def test_two_steps() -> None:
@@ -311,9 +311,9 @@ def test_a_given_delay_is_taken_off_first(tmp_path, params, good, late) -> None:
     path = blind_bag(tmp_path, change=shift("color", "depth", by=late))
     with pytest.raises(UserError, match=r"episode\.delays\.camera: (\S+) in params") as caught:
         read_recording(path, params.setup)
-    told = float(str(caught.value).partition("camera: ")[2].split()[0])
-    assert told == pytest.approx(late, abs=0.05)
-    for camera in (late, told):
+    summary = float(str(caught.value).partition("camera: ")[2].split()[0])
+    assert summary == pytest.approx(late, abs=0.05)
+    for camera in (late, summary):
         delays = params.episode.delays.model_copy(update={"camera": camera})
         found = read_recording(path, params.setup, delays)
         assert found.late == {"color": camera, "depth": camera}
@@ -322,8 +322,8 @@ def test_a_given_delay_is_taken_off_first(tmp_path, params, good, late) -> None:
         given = params.model_copy(
             update={"episode": params.episode.model_copy(update={"delays": delays})}
         )
-        right, said = correct_delays(Pull.of(found, params.setup), given)
-        assert said.camera.applied and said.camera.value == camera
+        right, output = correct_delays(Pull.of(found, params.setup), given)
+        assert output.camera.applied and output.camera.value == camera
         np.testing.assert_array_equal(right.recording.depth.stamp, found.depth.stamp)  # not twice
 
 

@@ -224,8 +224,8 @@ def test_cameras_that_play_no_role_give_way_where_a_file_is_too_large(
     topics = [SCHEMA, channel(), channel(2, "/camera/infra1/image_raw"), channel(3, "/airy")]
     sent = [message(k, 1 + k % 2, (used, idle)[k % 2]) for k in range(6)]
     found = read(tmp_path, *topics, *sent, message(6, 3))
-    kept = {one.topic: {*map(len, one.payloads)} for one in found.channels}
-    assert kept == {"/x": {300}, "/camera/infra1/image_raw": {0}, "/airy": {8}}
+    retained = {one.topic: {*map(len, one.payloads)} for one in found.channels}
+    assert retained == {"/x": {300}, "/camera/infra1/image_raw": {0}, "/airy": {8}}
     assert times(found, "/camera/infra1/image_raw") == [1, 3, 5]
     assert any("without those of /camera/infra1/image_raw" in note for note in found.notes)
     with pytest.raises(UserError, match="holds more than"):

@@ -68,12 +68,12 @@ def test_a_split_bag_of_packed_parts(whole, tmp_path) -> None:
         (gzip.compress(b"version https://git-lfs"), "what is packed in it is a Git LFS pointer"),
     ],
 )
-def test_what_else_it_is(tmp_path, first, said) -> None:
+def test_what_else_it_is(tmp_path, first, message) -> None:
     path = tmp_path / "my.mcap"
     path.write_bytes(first)
     with pytest.raises(UserError, match="my.mcap: ") as caught:
         read_container(path)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_a_small_file_that_unpacks_to_much(tmp_path, monkeypatch) -> None:

@@ -32,8 +32,8 @@ def test_bursts_are_spread_back_to_where_samples_were_taken(size, width, late, l
     end = np.array([true[burst == k][-1] for k in range(burst[-1] + 1)])
     end = end + random.integers(0, late + 1, len(end))
     stamp = end[burst] + (np.arange(len(true)) % size) * min(width, MS // 8 // size)
-    kept = ~np.isin(burst, [one * (burst[-1] // 100) for one in lost])
-    stamp, true, values = stamp[kept], true[kept], values[kept]
+    retained = ~np.isin(burst, [one * (burst[-1] // 100) for one in lost])
+    stamp, true, values = stamp[retained], true[retained], values[retained]
     even, bursts = pace.without_bursts(stamp, stamp + 100_000, values)
     assert bursts.count == size and bursts.before
     whole = slice(size, len(true) - size)
@@ -85,10 +85,10 @@ def test_held_values_are_taken_once(times, jitter, rests) -> None:
     values = np.stack([path, 0 * path], axis=1)
     hold = pace.hold_of(stamp, values)
     assert hold == pytest.approx(times * MS, rel=0.02)
-    kept = pace.first_of_each(stamp, values, hold)
-    moving = np.flatnonzero(kept & (np.arange(count) > count // 2 + times))
+    retained = pace.first_of_each(stamp, values, hold)
+    moving = np.flatnonzero(retained & (np.arange(count) > count // 2 + times))
     np.testing.assert_array_equal(moving % times, 0)
-    assert np.diff(stamp[kept]).max() < 2.5 * times * MS  # a rest is no gap
+    assert np.diff(stamp[retained]).max() < 2.5 * times * MS  # a rest is no gap
 
 
 def test_a_coarse_encoder_is_not_held() -> None:

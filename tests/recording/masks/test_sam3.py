@@ -104,9 +104,9 @@ def test_folders_that_cannot_be_used(spoil, words, weights, view, tmp_path) -> N
 def _drop_a_weight(folder) -> None:
     from safetensors.numpy import load_file, save_file
 
-    kept = load_file(folder / "model.safetensors")
-    kept.pop(sorted(kept)[0])
-    save_file(kept, folder / "model.safetensors", metadata={"format": "pt"})
+    retained = load_file(folder / "model.safetensors")
+    retained.pop(sorted(retained)[0])
+    save_file(retained, folder / "model.safetensors", metadata={"format": "pt"})
 
 
 def test_a_device_that_is_not_there(weights, view) -> None:

@@ -100,12 +100,12 @@ def make(root: Path) -> None:
     theta |= {"history": {"pull_time": 1.4, "pause": 0.6}, "nuisances": {"air_drag": 0.3}}
     theta |= {"turn_damping": 0.2, "returned_share": 1.0, "confidence": confidence()}
     posterior = {"names": [*POINT], "samples": samples().tolist()}
-    for path, told in (
+    for path, summary in (
         (layout.theta(BAND, METHOD), theta),
         (layout.confidence(BAND, METHOD), posterior),
     ):
         path.parent.mkdir(parents=True)
-        path.write_text(json.dumps(told))
+        path.write_text(json.dumps(summary))
     layout.trials(BAND, METHOD).parent.mkdir(parents=True)
     trials().to_parquet(layout.trials(BAND, METHOD))
     write_stored(layout.policy(BAND, METHOD))
@@ -129,5 +129,5 @@ def card_params(project: Path) -> Params:
 
 
 @pytest.fixture(scope="session")
-def told(project: Path, card_params: Params) -> CardInputs:
+def summary(project: Path, card_params: Params) -> CardInputs:
     return card_inputs(card_params, BAND, METHOD, project)

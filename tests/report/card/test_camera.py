@@ -21,8 +21,10 @@ from tests.report.card.conftest import BAND, METHOD, TRUTH
 
 
 @pytest.fixture(scope="module")
-def pictures(told, project) -> Pictures:
-    return Pictures.of(Layout(project).raw(BAND) / "seen.mcap", told.episode, told.params.setup)
+def pictures(summary, project) -> Pictures:
+    return Pictures.of(
+        Layout(project).raw(BAND) / "seen.mcap", summary.episode, summary.params.setup
+    )
 
 
 def band_coloured(image: np.ndarray, places: np.ndarray) -> float:
@@ -32,7 +34,7 @@ def band_coloured(image: np.ndarray, places: np.ndarray) -> float:
     return float(np.mean(seen[:, 2] - seen[:, 0] > 60))
 
 
-def test_the_recorded_band_is_seen_where_it_is_projected(pictures, told) -> None:
+def test_the_recorded_band_is_seen_where_it_is_projected(pictures, summary) -> None:
     drawn = np.flatnonzero((pictures.time > TRUTH.drawn) & (pictures.time < TRUTH.release - 0.02))
     assert len(drawn) > 3
     for number in drawn:
@@ -44,7 +46,7 @@ def test_the_recorded_band_is_seen_where_it_is_projected(pictures, told) -> None
         assert band_coloured(pictures[number], places + [0, 4]) < 0.1
 
 
-def test_a_cut_shows_the_same_larger(pictures, told) -> None:
+def test_a_cut_shows_the_same_larger(pictures, summary) -> None:
     line = TRUTH.center_line(2.9)
     simulated = Simulated(
         TRUTH.release, 0.0, np.array([0.0, 4.0]), np.array([line, line]), np.arange(180.0),
@@ -79,13 +81,13 @@ def test_the_latest_picture(pictures) -> None:
         assert pictures.latest(pictures.time[number] + 1e-6) == number
 
 
-def test_a_missing_recording_is_named(told, tmp_path) -> None:
+def test_a_missing_recording_is_named(summary, tmp_path) -> None:
     with pytest.raises(NotMade, match="none.mcap"):
-        Pictures.of(tmp_path / "none.mcap", told.episode, told.params.setup)
+        Pictures.of(tmp_path / "none.mcap", summary.episode, summary.params.setup)
 
 
-def test_a_simulated_pull_holds_the_hand_and_its_states_are_smooth(told, card_params) -> None:
-    simulated = simulate(card_params, BAND, METHOD, told.episode, told.theta)
+def test_a_simulated_pull_holds_the_hand_and_its_states_are_smooth(summary, card_params) -> None:
+    simulated = simulate(card_params, BAND, METHOD, summary.episode, summary.theta)
     assert simulated.release == TRUTH.release
     middle = simulated.line(TRUTH.release - 0.05)[60]
     np.testing.assert_allclose(middle, TRUTH.hand(TRUTH.release - 0.05), atol=5e-3)
@@ -94,27 +96,27 @@ def test_a_simulated_pull_holds_the_hand_and_its_states_are_smooth(told, card_pa
     between = simulated.line(float(simulated.time[fine][:2].mean()))
     ends = [simulated.line(float(time)) for time in simulated.time[fine][:2]]
     np.testing.assert_allclose(between, np.mean(ends, axis=0), atol=3e-4)
-    assert simulated.force.shape == told.episode.force.shape
-    assert simulated.force[(told.episode.time > 2.5) & (told.episode.time < 2.9), 1].min() > 3
+    assert simulated.force.shape == summary.episode.force.shape
+    assert simulated.force[(summary.episode.time > 2.5) & (summary.episode.time < 2.9), 1].min() > 3
 
 
-def test_a_colour_camera_beside_the_depth_camera(told, project) -> None:
+def test_a_colour_camera_beside_the_depth_camera(summary, project) -> None:
     """What lies before the depth camera is seen where the colour camera's own frame has it."""
-    path, setup = Layout(project).raw(BAND) / "seen.mcap", told.params.setup
+    path, setup = Layout(project).raw(BAND) / "seen.mcap", summary.params.setup
     recording = read_recording(path, setup)
     geometry = geometry_of(recording, setup)
     beside = Transform(Rotation.from_rotvec([0.02, -0.05, 0.01]), np.array([0.06, 0.01, -0.02]))
-    kept = EpisodeGeometry.of(recording, replace(geometry, color=beside)).content()
-    metadata = told.episode.metadata | {"geometry": json.loads(json.dumps(kept))}
-    pictures = Pictures.of(path, replace(told.episode, metadata=metadata), setup)
+    retained = EpisodeGeometry.of(recording, replace(geometry, color=beside)).content()
+    metadata = summary.episode.metadata | {"geometry": json.loads(json.dumps(retained))}
+    pictures = Pictures.of(path, replace(summary.episode, metadata=metadata), setup)
     before = np.array([[0.1, -0.05, 0.9], [-0.2, 0.1, 1.3]])  # the depth camera
     fork = geometry.camera.apply(before)
     expected = pictures.camera.project(beside.apply(before))
     np.testing.assert_allclose(pictures.project(fork), expected, atol=1e-6)
 
 
-def test_an_episode_of_an_older_version_is_named_with_its_remedy(told, project) -> None:
+def test_an_episode_of_an_older_version_is_named_with_its_remedy(summary, project) -> None:
     path = Layout(project).raw(BAND) / "seen.mcap"
-    old = {key: value for key, value in told.episode.metadata.items() if key != "geometry"}
+    old = {key: value for key, value in summary.episode.metadata.items() if key != "geometry"}
     with pytest.raises(UserError, match=f"of {BAND} are of an older version.*dvc repro"):
-        Pictures.of(path, replace(told.episode, metadata=old), told.params.setup)
+        Pictures.of(path, replace(summary.episode, metadata=old), summary.params.setup)

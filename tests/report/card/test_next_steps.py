@@ -54,11 +54,11 @@ def test_a_dip_is_recommended_where_no_pull_unloads() -> None:
     covariance[:4, :4] = model.covariance
     spread = np.sqrt(np.einsum("td,de,te->t", gradient, covariance, gradient) + model.draw**2)
     free = LandingModel(names, covariance, gradient, model.draw, 1.645 * spread)
-    (told,) = [
+    (explained,) = [
         one for one in next_steps("toy", [], free, targets, pulls, unloaded=False) if "dip" in one
     ]
     less = free.after(free.exact(["softening"]))[1]
-    after = float(told.split("±")[2].split()[0]) / 100
+    after = float(explained.split("±")[2].split()[0]) / 100
     assert less <= after + 5e-4 and after < 0.8 * free.half_width[1]
     assert after == pytest.approx(less, abs=0.01)
 
@@ -66,8 +66,8 @@ def test_a_dip_is_recommended_where_no_pull_unloads() -> None:
 def test_what_speaks_against_any_use_is_mended_first() -> None:
     model = landing_model()
     reasons = [Reason(True, "why", "Do this."), Reason(False, "too", "And that.")]
-    asked = "toy", reasons, model, np.array([1.7, 1.9]), [still(0.0)]
-    assert next_steps(*asked) == ["Do this.", "And that."]
+    requested = "toy", reasons, model, np.array([1.7, 1.9]), [still(0.0)]
+    assert next_steps(*requested) == ["Do this.", "And that."]
 
 
 def test_where_nothing_helps_it_says_so() -> None:

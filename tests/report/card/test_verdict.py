@@ -99,10 +99,10 @@ def test_several_misses_ask_for_mass_and_size_first() -> None:
 
 
 @pytest.mark.parametrize(("density", "asked"), [(1000.0, False), (833.0, True), (1400.0, True)])
-def test_a_density_that_no_solid_rubber_has_is_asked_about(density, asked) -> None:
+def test_a_density_that_no_solid_rubber_has_is_asked_about(density, requested) -> None:
     found = replace(GOOD, density=density)
-    assert bool(question(found)) is asked and judge(found) == (TRUSTED, [])
-    assert not asked or f"{density:.0f} kg/m³" in question(found)
+    assert bool(question(found)) is requested and judge(found) == (TRUSTED, [])
+    assert not requested or f"{density:.0f} kg/m³" in question(found)
     assert question(replace(GOOD, density=None)) == ""
 
 
@@ -116,8 +116,8 @@ def test_one_launch_is_called_one() -> None:
     assert "One launch is part of the evidence" in reasons_of(replace(GOOD, observed=1), [])[-1]
 
 
-def test_the_weight_that_the_hand_carries(told) -> None:
-    episode = told.episode
+def test_the_weight_that_the_hand_carries(summary) -> None:
+    episode = summary.episode
     weight = np.tile([0.0, 0.0, -0.2], (len(episode.time), 1))
     same = replace(episode, force=0.7 * weight)
     assert carried(same, weight) == pytest.approx(0.7)
@@ -126,24 +126,24 @@ def test_the_weight_that_the_hand_carries(told) -> None:
     assert carried(same, drawn) is None
 
 
-def test_findings_are_those_of_the_files(told) -> None:
-    found = findings(told)
+def test_findings_are_those_of_the_files(summary) -> None:
+    found = findings(summary)
     assert found.settled and found.force == 0.05 and found.recoil == 2e-3
     assert (found.outside, found.scores, found.kind) == (0, 2, "measured")
     assert found.off == pytest.approx(0.02)
     assert found.at_sides == []
-    half = np.hypot(0.1375, np.linalg.norm(told.aims.draw, axis=1))
+    half = np.hypot(0.1375, np.linalg.norm(summary.aims.draw, axis=1))
     assert found.stretch == pytest.approx(2 * half.max() / 0.52, rel=1e-6)
     assert found.recorded_stretch == pytest.approx(2 * np.hypot(0.1375, 0.38) / 0.52, rel=1e-3)
 
 
-def test_findings_tell_what_was_odd_of_a_recording(told) -> None:
+def test_findings_tell_what_was_odd_of_a_recording(summary) -> None:
     about = {"about": "gap", "what": "/a*b <x> has a gap of 0.1 s", "cure": "record it again"}
     source = {"file": "a.mcap", "pull": 2}
-    odd = replace(told.episode, metadata={"input": source, "cautions": [about]})
+    odd = replace(summary.episode, metadata={"input": source, "cautions": [about]})
     sound = replace(odd, metadata={"input": source})
-    assert findings(replace(told, episodes=[sound])).cautions == []
-    assert findings(replace(told, episodes=[sound, odd])).cautions == [
+    assert findings(replace(summary, episodes=[sound])).cautions == []
+    assert findings(replace(summary, episodes=[sound, odd])).cautions == [
         (
             r"In pull 2 of `a.mcap`, /a\*b &lt;x> has a gap of 0.1 s.",
             "For pull 2 of `a.mcap`: record it again.",
@@ -151,9 +151,9 @@ def test_findings_tell_what_was_odd_of_a_recording(told) -> None:
     ]
 
 
-def test_findings_see_a_bad_score_a_side_and_odd_evidence(told) -> None:
+def test_findings_see_a_bad_score_a_side_and_odd_evidence(summary) -> None:
     rows = trials().assign(landing_y=[1.5, 2.1])
-    theta = dict(told.theta, theta=told.theta["theta"] | {"relaxation": 0.1996})
+    theta = dict(summary.theta, theta=summary.theta["theta"] | {"relaxation": 0.1996})
     launches = [{"left": None, "z_without_it": None}, {"left": -0.07, "z_without_it": -1.8}]
     recordings = [
         {"force_rms": force, "held_rms": 0, "recoil_rms": 0, "pictures": []}
@@ -161,12 +161,12 @@ def test_findings_see_a_bad_score_a_side_and_odd_evidence(told) -> None:
         for force in (0.1, 0.3)
     ]
     theta["confidence"] = theta["confidence"] | {"launches": launches, "recordings": recordings}
-    found = findings(replace(told, trials=rows, theta=theta))
+    found = findings(replace(summary, trials=rows, theta=theta))
     assert (found.outside, found.left, found.force) == (1, 0.07, 0.3)
     assert (found.observed, found.surprising) == (1, 1)
     assert found.bias == pytest.approx(np.mean([1.5 / 1.92, 2.1 / 2.08]) - 1)
     assert found.bias_of_half == pytest.approx(np.mean([-4.2, 0.2]))
-    assert found.density == pytest.approx(told.params.bands[told.band].density)
+    assert found.density == pytest.approx(summary.params.bands[summary.band].density)
     assert found.odd == "pull 3 of `0.3.mcap`"
     assert found.at_sides == [
         ("stress relaxation per decade of time", "upper side of its box, 0 to 20 %")

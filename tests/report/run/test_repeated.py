@@ -99,8 +99,8 @@ def test_other_settings_of_the_campaign_are_named_beside_its_numbers(tmp_path) -
     ours = with_(ours, "trials", targets=(1.9,)).model_copy(update={"methods": methods})
     keys = ["methods.adam.mounting", "optimizer.cma_rollouts", "trials.targets"]
     assert [one.key for one in repeated.changed_settings(ours)] == keys
-    said = claims(repeated, ours)
-    assert f"other settings than this run: {', '.join(keys)}." in " ".join(said)
+    message = claims(repeated, ours)
+    assert f"other settings than this run: {', '.join(keys)}." in " ".join(message)
 
 
 def test_a_file_of_something_else_is_one_line(tmp_path) -> None:

@@ -122,16 +122,16 @@ def test_the_report_is_complete_and_equal_in_another_process(root, params) -> No
 
 def test_a_run_of_three_bands_is_told_in_few_words_and_pictures(root, params, text_alone) -> None:
     text = written(root, rig(root, params, ("band1", "band2", "band3")))
-    told, appendix = text.split("\n# Appendix\n")
-    words = [word for word in told.split() if re.search(r"\w", word)]
+    summary, appendix = text.split("\n# Appendix\n")
+    words = [word for word in summary.split() if re.search(r"\w", word)]
     assert len(words) <= 2500
     chapters = ["What came out", "The bands", "The paper's tables", "The paper's evaluation"]
-    assert re.findall("^## (.*)$", told, re.MULTILINE) == chapters
-    assert [f"### Table {n}\n" in told for n in (1, 2, 3, 4)] == [True] * 4
+    assert re.findall("^## (.*)$", summary, re.MULTILINE) == chapters
+    assert [f"### Table {n}\n" in summary for n in (1, 2, 3, 4)] == [True] * 4
     assert "not run" not in text and text.count(".png") <= 15
-    sentences = [line for line in told.splitlines() if line.startswith("- ") and "⚠" not in line]
+    sentences = [line for line in summary.splitlines() if line.startswith("- ") and "⚠" not in line]
     assert len([line for line in sentences if "](bands/" not in line]) <= 8
-    assert "[band2](bands/band2/README.md)" in told and "| band3 | 4 virtual | 3.0 |" in told
+    assert "[band2](bands/band2/README.md)" in summary and "| band3 | 4 virtual | 3.0 |" in summary
 
 
 def test_a_band_that_nobody_launched_is_told_without_emptiness(root, params, text_alone) -> None:

@@ -148,11 +148,11 @@ def test_a_second_loading_follows_the_first_unloading() -> None:
     np.testing.assert_allclose(second[:60], unloading[::-1][:60], rtol=1e-3, atol=1e-6)
     np.testing.assert_allclose(second[62:], stress(further[62:]), rtol=1e-3)
     assert (unloading[10:-1] < 0.9 * stress(back[10:-1])).all()
-    kept = unloading[30] / stress(1.3)
+    retained = unloading[30] / stress(1.3)
     worst, energy = TRELOAR.energy(1.6), TRELOAR.energy(1.3)
     width = 0.1 * TRELOAR.modulus + 0.1 * worst
     erf = quad(lambda u: 2 / np.sqrt(np.pi) * np.exp(-(u**2)), 0, (worst - energy) / width)[0]
-    assert np.isclose(kept, 1 - erf / 2, rtol=1e-3)
+    assert np.isclose(retained, 1 - erf / 2, rtol=1e-3)
 
 
 def test_the_history_softens_as_the_rates_do() -> None:
@@ -224,11 +224,11 @@ def test_each_number_of_a_memory_counts() -> None:
     times = np.linspace(0, 1, 201)
     path = lambda time: 1.3 - 0.3 * np.cos(2 * np.pi * time)  # noqa: E731
 
-    def felt(rubber: Rubber) -> np.ndarray:
+    def reaction(rubber: Rubber) -> np.ndarray:
         return followed(rubber, path, times)[0]
 
     for rubber, part in ((FLOWING, "flow"), (SOFT, "softening")):
-        plain, section = felt(rubber), getattr(rubber, part)
+        plain, section = reaction(rubber), getattr(rubber, part)
         for name in vars(section).keys() - {"lag", "strain"}:
             other = replace(section, **{name: 1.5 * getattr(section, name)})
-            assert np.abs(felt(replace(rubber, **{part: other})) - plain).max() > 1e-3, name
+            assert np.abs(reaction(replace(rubber, **{part: other})) - plain).max() > 1e-3, name

@@ -40,8 +40,8 @@ def test_band1_stiffens_as_the_silicone_nearest_to_it(params: Params, shared: Pa
     string = string_of(params, "band1")
     most = float(straight(string, np.array([0.0, -0.4, 0.0])))
     hand = 2 * np.pi / 4 * string.diameter**2 * 0.4 / (most * string.length / 2)
-    asked = params.rig.bands["band1"].peak_force / hand / 1e6
-    gap = {name: abs(np.interp(most, *curve) - asked) for name, curve in curves.items()}
+    requested = params.rig.bands["band1"].peak_force / hand / 1e6
+    gap = {name: abs(np.interp(most, *curve) - requested) for name, curve in curves.items()}
     assert min(gap, key=lambda name: gap[name]) == "PlatSil_Gel_10"
 
     stretch, stress = curves["PlatSil_Gel_10"]

@@ -121,7 +121,7 @@ def test_readable_by_rerun(recorded: tuple[Path, Interaction], tmp_path: Path) -
         assert f"\n{component}: " in stats
 
 
-def felt(messages: dict[str, list[Any]]) -> np.ndarray:
+def response(messages: dict[str, list[Any]]) -> np.ndarray:
     """Force as a lab would see it (T, 3): in frame O by /tf_static and the pose, tared."""
     frames = transforms(messages)
     pose = messages["/franka_robot_state_broadcaster/current_pose"][0].pose
@@ -136,13 +136,13 @@ def test_force_peaks_as_the_papers_and_the_same_seed_gives_the_same_bytes(
 ) -> None:
     monkeypatch.setattr(camera, "RATE", 1.0)
     quick = with_(coarse, "rig", edges=24, tolerance=5e-4)
-    told = {12.18: messages}
+    stated = {12.18: messages}
     for name, band, peak in (("a", "band2", 14.25), ("b", "band2", 14.25), ("c", "band3", 16.70)):
         record(quick, band, tmp_path / name, picture_scale=0.1)
-        told[peak] = told.get(peak) or read(tmp_path / name, *FELT)
+        stated[peak] = stated.get(peak) or read(tmp_path / name, *FELT)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
-    for peak, one in told.items():
-        smooth = np.convolve(felt(one)[:, 1], np.ones(50) / 50, "same")
+    for peak, one in stated.items():
+        smooth = np.convolve(response(one)[:, 1], np.ones(50) / 50, "same")
         assert np.isclose(smooth.max(), peak, rtol=0.01)
         assert 5.5 < np.argmax(smooth) / 1000 < 6.5
         assert np.abs(smooth[9500:9900]).max() < 0.1  # the hand is at rest again
@@ -159,7 +159,7 @@ def test_the_tool_swings_back_into_the_wrench(messages, recorded, coarse) -> Non
     just, before = round(1000 * slip) + 2, round(1000 * slip) - 2
     jolt = rig.wrench.tool_mass / rig.arm.mass * happened.force[before, 1]
     assert 0.8 * jolt < -rig.wrench.tool_mass * happened.acceleration[just, 1] < 1.2 * jolt
-    rest = felt(messages) - happened.force + rig.wrench.tool_mass * happened.acceleration
+    rest = response(messages) - happened.force + rig.wrench.tool_mass * happened.acceleration
     rest -= rest[:300].mean(axis=0)
     assert np.abs(rest.mean(axis=0)).max() < rig.wrench.drift
     assert np.abs(rest - rest.mean(axis=0)).max() < rig.wrench.drift + 6 * rig.wrench.noise

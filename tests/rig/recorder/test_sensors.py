@@ -23,14 +23,14 @@ def test_wrench(params: Params) -> None:
     robot, settings = Robot.of(rig), rig.wrench
     still = np.zeros((COUNT, 3))
     happened = Interaction(still + FORCE, still, still + ACCELERATION, None, None, 0.0)
-    felt = robot.sensor.apply(wrench(happened, robot, settings, rng).reshape(-1, 3))
-    felt = felt.reshape(COUNT, 2, 3)
+    response = robot.sensor.apply(wrench(happened, robot, settings, rng).reshape(-1, 3))
+    response = response.reshape(COUNT, 2, 3)
     tool = settings.tool_mass * (np.array([0.0, 0.0, -9.81]) - ACCELERATION)
     ahead = np.array([0.0, np.cos(rig.tool_pitch), -np.sin(rig.tool_pitch)])
     torque = np.cross(SENSOR_LEVER * ahead, FORCE + TOOL_CENTER * tool)
-    np.testing.assert_allclose(felt[:, 1].mean(axis=0), torque, atol=3e-4)
-    np.testing.assert_allclose(felt[:, 1].std(axis=0), settings.torque_noise, rtol=0.03)
-    astray = felt[:, 0] - FORCE - tool
+    np.testing.assert_allclose(response[:, 1].mean(axis=0), torque, atol=3e-4)
+    np.testing.assert_allclose(response[:, 1].std(axis=0), settings.torque_noise, rtol=0.03)
+    astray = response[:, 0] - FORCE - tool
     time = np.linspace(0, 1, COUNT)
     drift, bias = np.polyfit(time, astray, 1)
     assert np.isclose(np.linalg.norm(bias), settings.bias, rtol=0.01)

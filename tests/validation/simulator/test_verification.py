@@ -40,8 +40,8 @@ def test_report_and_figures(bench, tmp_path, monkeypatch):
     assert "## Against MuJoCo\n\nNot run: mujoco is not installed." in text
     assert "1 of 2 limits are kept, 1 not" in text
     assert (tmp_path / "reports/simulator/x.png").read_bytes() == b"png"
-    kept = json.loads((tmp_path / "reports/simulator.json").read_text("utf-8"))
-    assert kept["sections"][2]["checks"][0]["met"] is False and kept["device"] == "cpu"
+    retained = json.loads((tmp_path / "reports/simulator.json").read_text("utf-8"))
+    assert retained["sections"][2]["checks"][0]["met"] is False and retained["device"] == "cpu"
     assert any("NOT MET: beam" in line for line in lines)
     summary, missed = report.summary(sections)
     assert missed == 1 and "1 of 2 limits kept" in summary

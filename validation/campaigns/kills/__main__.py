@@ -124,8 +124,10 @@ def disturb(
         one["ended"] = one["status"] == 0
         lines.add({"what": "attempt", "name": name, "by": by, **one})
         count += disturbances(one)
-        told = [kill["hit"] for kill in one.get("kills", ())] or one.get("said") or "not disturbed"
-        say(f"{name}, {by} {count} of {wanted}: {one['seconds']:.0f} s, {told}")
+        summary = (
+            [kill["hit"] for kill in one.get("kills", ())] or one.get("said") or "not disturbed"
+        )
+        say(f"{name}, {by} {count} of {wanted}: {one['seconds']:.0f} s, {summary}")
         for fault in one["faults"]:
             say(f"  fault: {fault}")
         if one["ended"]:
@@ -251,13 +253,13 @@ def main() -> int:
         "full disk": shares(arguments.full_disks, names),
     }
     with ThreadPoolExecutor(arguments.at_once) as pool:
-        asked = [
+        requested = [
             pool.submit(campaign, name, by, wanted[name], work, lines, expected)
             for by, wanted in todo.items()
             for name in names
             if wanted[name]
         ]
-        for one in asked:
+        for one in requested:
             one.result()
     content = report(lines, arguments.kills, arguments.full_disks, expected, names)
     for one in content["figures"]["faults"]:  # wherever it ran

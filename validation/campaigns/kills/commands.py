@@ -112,10 +112,10 @@ class StruckCopy(ProjectCopy):
         alive = lambda: [one for one in self.run.alive() if one.pid not in apart]  # noqa: E731
         wait(lambda: not alive(), seconds)
         found = alive()
-        said = [" ".join(one.cmdline()) for one in found if one.is_running()]
+        message = [" ".join(one.cmdline()) for one in found if one.is_running()]
         for one in found:
             send(one)
-        return said
+        return message
 
     def mend(self) -> bool:
         """What docs/flow.md advises before this command is begun again; whether it was needed."""

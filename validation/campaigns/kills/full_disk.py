@@ -61,7 +61,7 @@ def filled(copy: StruckCopy, number: int, seed: int, full: bool) -> dict:
 
     Returns:
         `status`, `seconds`, `full_after_s` (None: the command had ended before), `free_bytes`,
-        `said` (the line that says so), and `faults`.
+        `message` (the line that says so), and `faults`.
     """
     rng = chance(copy, number, seed)
     ballast, free = copy.disk / "ballast", int(rng.integers(0, ROOM))
@@ -81,10 +81,10 @@ def filled(copy: StruckCopy, number: int, seed: int, full: bool) -> dict:
     if left := copy.left(PROMPT):
         faults.append(f"lives {PROMPT:g} s later: {left}")
     ballast.unlink(missing_ok=True)
-    said = copy.run.said
-    lines = [one for one in said.splitlines() if any(what in one for what in SAYS)]
-    if status and (since is None or not lines or "Traceback" in said):
-        faults.append(f"status {status}: {said[-1500:]}")
+    message = copy.run.message
+    lines = [one for one in message.splitlines() if any(what in one for what in SAYS)]
+    if status and (since is None or not lines or "Traceback" in message):
+        faults.append(f"status {status}: {message[-1500:]}")
     return {
         "status": status,
         "seconds": seconds,

@@ -89,9 +89,9 @@ def struck(copy: StruckCopy, number: int, most: int, seed: int) -> dict:
         faults.append(f"did not end within {ENDED:g} s")
     if left := copy.left(PROMPT):
         faults.append(f"lives {PROMPT:g} s later: {left}")
-    said = copy.run.said
-    if "Traceback" in said or (status and not kills):
-        faults.append(f"status {status}: {said[-1500:]}")
+    message = copy.run.message
+    if "Traceback" in message or (status and not kills):
+        faults.append(f"status {status}: {message[-1500:]}")
     return {
         "status": status,
         "kills": kills,

@@ -170,13 +170,13 @@ def _call(*arguments: str) -> str:
     except OSError as error:
         raise UserError(f"{INTERPRETER}={python}: {error.strerror}") from error
     if done.returncode:
-        said = _last_line(done.stderr)
-        if "NotFoundError" in said:
+        message = _last_line(done.stderr)
+        if "NotFoundError" in message:
             raise UserError(
-                f"PhysX is not installed ({said.partition(': ')[2]}): make an environment of"
+                f"PhysX is not installed ({message.partition(': ')[2]}): make an environment of"
                 f" its own, pip install {PACKAGES} there, and set {INTERPRETER} to its python"
             )
-        raise UserError(f"PhysX: {said}")
+        raise UserError(f"PhysX: {message}")
     return done.stdout
 
 

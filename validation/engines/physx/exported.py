@@ -168,8 +168,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("usd", type=Path)
     parser.add_argument("yaml", type=Path)
-    asked = parser.parse_args()
-    version, cards = release(), [folder / "card.json" for folder in (asked.usd, asked.yaml)]
+    requested = parser.parse_args()
+    version, cards = release(), [folder / "card.json" for folder in (requested.usd, requested.yaml)]
     for card in cards:
         if not card.exists():
             raise UserError(f"{card.parent}: no export; `sling export` writes it")
@@ -177,8 +177,8 @@ def main() -> None:
     name = card["band"]
     about = environment("cuda:0", "python -m validation.engines.physx.exported USD YAML")
     about["versions"] |= {"ovphysx": version}
-    launches = YAML(typ="safe").load(asked.yaml / f"{name}.yaml")["launches"]
-    band, stiffness = ExportedBand.read(asked.usd / f"{name}.usda"), load().setup.arm_stiffness
+    launches = YAML(typ="safe").load(requested.yaml / f"{name}.yaml")["launches"]
+    band, stiffness = ExportedBand.read(requested.usd / f"{name}.usda"), load().setup.arm_stiffness
     with Engine() as engine:
         rows = compared(band, launches, stiffness, engine)
     content = {"asked": ASKED, "met": met(rows), "band": name, "matched": card["matched"]}

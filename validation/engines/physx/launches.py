@@ -96,18 +96,18 @@ def main() -> None:
     parser.add_argument("--theta", required=True, help="E,nu,d,mu,s")
     parser.add_argument("--rate", type=int, default=RATE, help="PhysX's steps a second")
     parser.add_argument("--params", default="params.yaml")
-    asked = parser.parse_args()
-    if asked.rate < 1:
-        raise UserError(f"--rate {asked.rate}: must be a whole number above 0")
-    params = load(asked.params)
-    if asked.band not in params.bands:
-        raise UserError(f"no band {asked.band} in {asked.params}")
-    sling, setup = load_sling(params, asked.band), alike(params)
+    requested = parser.parse_args()
+    if requested.rate < 1:
+        raise UserError(f"--rate {requested.rate}: must be a whole number above 0")
+    params = load(requested.params)
+    if requested.band not in params.bands:
+        raise UserError(f"no band {requested.band} in {requested.params}")
+    sling, setup = load_sling(params, requested.band), alike(params)
     draws = draws_of(params.setup)
-    thetas = np.tile(theta_of(asked.theta), (len(draws), 1))
+    thetas = np.tile(theta_of(requested.theta), (len(draws), 1))
     ours = launch(sling, setup, Parameters.of(sling.law, thetas), draws)
     with Engine() as engine:
-        theirs = launch_in_physx(engine, sling, setup, thetas, draws, rate=asked.rate)
+        theirs = launch_in_physx(engine, sling, setup, thetas, draws, rate=requested.rate)
     print(*(f"{name:>9}" for name in COLUMNS), " PhysX: why not")
     done = theirs.launches
     columns = *draws.T, ours.landing_y, done.landing_y, ours.hold_force, done.hold_force

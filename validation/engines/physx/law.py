@@ -84,8 +84,8 @@ def force_on(
         past = _gradients(tube, near, earlier)[1]
         nominal = nominal + viscous(past, gradient, np.asarray(delay)[..., None], *moduli)
     shares = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
-    kept = shares * held.ravel()[near][..., None]
-    return -np.einsum("t,...tij,tkj->...i", np.linalg.det(before) / 6, nominal, kept)
+    retained = shares * held.ravel()[near][..., None]
+    return -np.einsum("t,...tij,tkj->...i", np.linalg.det(before) / 6, nominal, retained)
 
 
 def _strain(gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

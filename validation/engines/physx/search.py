@@ -146,17 +146,17 @@ def main() -> None:
     parser.add_argument("band")
     parser.add_argument("--params", default="params.yaml")
     parser.add_argument("--landings", help="CSV of measured launches of this band")
-    asked = parser.parse_args()
-    params, version = load(asked.params), release()
-    command = f"python -m validation.engines.physx.search {asked.band}"
-    command += " --landings CSV" if asked.landings else ""
+    requested = parser.parse_args()
+    params, version = load(requested.params), release()
+    command = f"python -m validation.engines.physx.search {requested.band}"
+    command += " --landings CSV" if requested.landings else ""
     about = environment(devices()[0], command)
-    if asked.landings:
-        table = pd.read_csv(asked.landings)
+    if requested.landings:
+        table = pd.read_csv(requested.landings)
         draws, measured = table[["draw_y_m", "draw_z_m"]].to_numpy(), table.landing_y_m
     else:
         draws, measured = draws_of(params.setup), None
-    comparison, content, thetas = Comparison(params, asked.band), {}, []
+    comparison, content, thetas = Comparison(params, requested.band), {}, []
     for name in (OURS, PHYSX):
         history, seconds = comparison.search(name)
         best = history.best()
@@ -171,14 +171,14 @@ def main() -> None:
         for name, row in zip((OURS, PHYSX), rows, strict=True):
             content[name].setdefault("loss_in", {})[where] = row
     content |= {
-        "band": asked.band,
+        "band": requested.band,
         "method": METHOD,
         "seed": params.optimizer.seed,
         "settings": {"steps_per_s": RATE, "iterations": ITERATIONS, "tetrahedra": 936},
         "launches_in_our_simulator": comparison.launches(np.array(thetas), draws, measured),
     }
     about["versions"] |= {"ovphysx": version}
-    path = Path("reports/validation") / f"physx-{asked.band}.json"
+    path = Path("reports/validation") / f"physx-{requested.band}.json"
     write_json(path, content | about)
     done, failures = {}, {}
     for where, rate in ((OURS, RATE), (PHYSX, RATE), (f"{PHYSX}_{FINE}_hz", FINE)):

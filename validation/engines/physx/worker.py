@@ -82,7 +82,7 @@ def start():
     return PhysX(config=PhysXConfig(carbonite_overrides={"/physics/suppressReadback": True}))
 
 
-def asked(folder: Path, nodes: np.ndarray) -> np.ndarray | None:
+def requested(folder: Path, nodes: np.ndarray) -> np.ndarray | None:
     """Targets (N, D, 3) of the next step for nodes (N, V, 3) [m]; None: the phase is over."""
     np.save(folder / "nodes.npy", nodes.astype(np.float32))
     print(f"\n{NEXT}", flush=True)  # PhysX may not have ended its line
@@ -113,7 +113,7 @@ def simulate(physx, folder: Path) -> None:
         drive = np.concatenate([place, flags], axis=2)
         begin = place[:, vertices] - offset - targets[0]
         targets = np.broadcast_to(targets, (len(fade), *targets.shape[1:]))
-        kept = []
+        retained = []
         wp.synchronize()
         began = time.perf_counter()
         for target, share, kept_one in zip(targets, fade, keep, strict=True):
@@ -121,19 +121,19 @@ def simulate(physx, folder: Path) -> None:
             scene.write(2, drive)
             physx.step_sync(step)
             if kept_one:
-                kept.append((scene.state()[0] - offset).astype(np.float32))
+                retained.append((scene.state()[0] - offset).astype(np.float32))
         wp.synchronize()
         result[f"seconds_{phase}"] = time.perf_counter() - began
         result[f"attach_seconds_{phase}"] = scene.seconds
         while job["steered"] and phase + 1 == job["phases"]:
-            targets = asked(folder, scene.state()[0] - offset)
+            targets = requested(folder, scene.state()[0] - offset)
             if targets is None:
                 break
             drive[:, vertices, :3] = offset + targets
             scene.write(2, drive)
             physx.step_sync(step)
         place, velocity = scene.state()
-        result[f"positions_{phase}"] = np.array(kept or np.zeros((0, *place.shape)), np.float32)
+        result[f"positions_{phase}"] = np.array(retained or np.zeros((0, *place.shape)), np.float32)
         result[f"velocities_{phase}"] = velocity
         scene.close()
     np.savez(folder / "result.npz", **result)

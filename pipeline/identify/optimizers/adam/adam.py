@@ -18,7 +18,7 @@ class Adam:
     the cube: D + 1 points. Then x moves by torch.optim.Adam and is clamped to the cube. The rate
     falls to zero along half a cosine over the budget.
 
-    A failed difference point is told as a huge loss. Its derivative is cut, else it would stay in
+    A failed difference point gets a huge loss. Its derivative is cut, else it would stay in
     Adam's running mean of squares and stop that axis for a thousand steps. A start whose own point
     is no better than the worst of the first batch has failed, or might as well: it goes back to its
     best point, forgets its momentum and halves its rate.

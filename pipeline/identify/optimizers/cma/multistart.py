@@ -37,7 +37,7 @@ class Multistart:
 
 
 class Solver:
-    """CMA-ES of one region, asked and told in the unit cube."""
+    """CMA-ES of one region, by ask and tell in the unit cube."""
 
     def __init__(self, region: Region, population: int, seed: int) -> None:
         import cma  # which imports Matplotlib: half a second that only a start needs

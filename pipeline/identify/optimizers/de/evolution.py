@@ -1,7 +1,7 @@
 """Differential evolution, which is SciPy's, behind ask and tell.
 
 SciPy calls an objective and neither asks nor stops between two generations. So it runs in a thread
-of its own, whose objective hands over each generation and waits until its losses are told. The two
+of its own, whose objective hands over each generation and waits for its losses. The two
 never run at once.
 """
 
@@ -75,10 +75,10 @@ class _Dropped(Exception):
     """Nobody holds the optimiser any more."""
 
 
-def _run(dimension: int, options: dict, asked: SimpleQueue, told: SimpleQueue) -> None:
+def _run(dimension: int, options: dict, points: SimpleQueue, answers: SimpleQueue) -> None:
     def objective(unit: np.ndarray) -> np.ndarray:
-        asked.put(np.ascontiguousarray(unit.T))
-        losses = told.get()
+        points.put(np.ascontiguousarray(unit.T))
+        losses = answers.get()
         if losses is None:
             raise _Dropped
         return losses
@@ -94,8 +94,8 @@ def _run(dimension: int, options: dict, asked: SimpleQueue, told: SimpleQueue) -
             tol=0.0,
             atol=-1,  # never met: every method spends its whole budget
         )
-        asked.put(RuntimeError("differential evolution was asked beyond its budget"))
+        points.put(RuntimeError("differential evolution was asked beyond its budget"))
     except _Dropped:
         pass
     except BaseException as error:
-        asked.put(error)
+        points.put(error)

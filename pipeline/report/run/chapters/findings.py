@@ -27,7 +27,7 @@ ENOUGH = 0.8  # of 90 % intervals hold the landing
 WIDE = 3.0  # half-widths in mean errors; 2 would do for normal errors
 CAVEAT = (
     "The comparisons hold for launches of these policies (95 % intervals), of one identification"
-    " each: another recording or another seed may turn them round"
+    " each: another recording or another seed may reverse them"
 )
 OWN = (
     "; and choices of ours were made with landings of the rig in sight"
@@ -41,13 +41,13 @@ def findings(report: Report) -> list[str]:
     Of the paper's findings the campaign on more recordings speaks, where its bands ran.
     """
     results, references = report.results, report.references
-    said, some = [], list(results)
+    sentences, some = [], list(results)
     for kind in LAUNCHED:
         if any((one.trials.kind == kind).any() for one in some):
-            said += [*_errors(report, kind), *_predictions(report, kind)]
+            sentences += [*_errors(report, kind), *_predictions(report, kind)]
     rows = compared(results, references, report.params.trials.seed)
     if len(references) > 1:
-        said += _beside(report, [row for row in rows if row.method == references[0]])
+        sentences += _beside(report, [row for row in rows if row.method == references[0]])
     claims = [
         sentence
         for claim, methods in CLAIMS.items()
@@ -56,8 +56,8 @@ def findings(report: Report) -> list[str]:
     own = OWN * (repeated.OURS in references and bool(results.floors))
     caveat = [f"{CAVEAT}{own}."] if rows else []
     if report.repeated and paper.METHOD in references:
-        return [*said, *caveat, *repeated.claims(report.repeated, report.params)]
-    return [*said, *claims, *caveat]
+        return [*sentences, *caveat, *repeated.claims(report.repeated, report.params)]
+    return [*sentences, *claims, *caveat]
 
 
 def _errors(report: Report, kind: str) -> list[str]:
@@ -100,19 +100,19 @@ def _predictions(report: Report, kind: str) -> list[str]:
     if not errors:
         return []
     name = report.styles[report.main].name
-    said = (
+    sentences = (
         f"{name[0].upper()}{name[1:]} predicts where its {kind} launches land within"
         f" {_between(errors)} % of the distance on average (bias {_between(biases, '+.1f')} %)."
     )
     if not count:
-        return [said]
+        return [sentences]
     text = f"{held} of these {count} landings lie in their 90 % interval,"
     text += f" which is {_between(widths)} % wide"
     if held < ENOUGH * count:
         text += ": too few, so the intervals are too narrow"
     elif np.mean(widths) / 2 > WIDE * 100 * np.mean(off):
         text += ": wider than such errors call for"
-    return [said, f"{text}."]
+    return [sentences, f"{text}."]
 
 
 def _beside(report: Report, rows: list[Compared]) -> list[str]:
@@ -122,9 +122,9 @@ def _beside(report: Report, rows: list[Compared]) -> list[str]:
         if paper.METHOD in row.found:
             found.setdefault(_verdict(report, row), []).append(row)
     words = []
-    for verdict, said in ((BETTER, "nearer on"), (WORSE, "further off on"), (SAME, SAME)):
+    for verdict, sentences in ((BETTER, "nearer on"), (WORSE, "further off on"), (SAME, SAME)):
         if some := found.get(verdict):
-            where = f"{said} {_list(row.band for row in some)}"
+            where = f"{sentences} {_list(row.band for row in some)}"
             words.append(where + ("" if verdict == SAME else _by(some, " by")))
     if not words:
         return []
@@ -149,13 +149,13 @@ def _claim(report: Report, rows: list[Compared], claim: str, methods: tuple[str,
         return _list(f"{n} ({', '.join(on)})" if several else n for n, on in names.items())
 
     # what lands further off than the paper's method is what the finding says
-    said = (
+    sentences = (
         (WORSE, "holds against", ", nearer by"),
         (BETTER, "does not hold against", ", further off by"),
     )
     parts = [
         f"{words} {which(tried[verdict])}{_by(tried[verdict], by)}"
-        for verdict, words, by in said
+        for verdict, words, by in sentences
         if verdict in tried
     ]
     parts += [f"is open against {which(tried[SAME])}"] if SAME in tried else []
@@ -187,35 +187,35 @@ def _verdict(report: Report, row: Compared) -> str:
 
 def doubts(report: Report) -> list[str]:
     """What did not go well, a sentence each."""
-    said = []
+    sentences = []
     for one in report.results:
         name = f"{one.band}, {report.styles[one.method].name}"
-        said += [f"⚠ {name}: {words}" for words in _wrong(one)]
-    return said + [
+        sentences += [f"⚠ {name}: {words}" for words in _wrong(one)]
+    return sentences + [
         f"⚠ {band}: {count} measured launches name a method that does not run on this band."
         for band, count in report.results.unused.items()
     ]
 
 
 def _wrong(one: Result) -> list[str]:
-    said, unpredicted = [], int(one.trials.predicted_y.isna().sum())
+    sentences, unpredicted = [], int(one.trials.predicted_y.isna().sum())
     if unpredicted:
-        said.append(f"{unpredicted} of {len(one.trials)} launches could not be predicted.")
+        sentences.append(f"{unpredicted} of {len(one.trials)} launches could not be predicted.")
     if not one.card["training"]["converged"]:
-        said.append("the policy did **not** converge in its own simulator.")
+        sentences.append("the policy did **not** converge in its own simulator.")
     if not one.confidence:
-        return said
+        return sentences
     if not one.confidence.get("settled", True):
         steps = one.confidence.get("steps", "all its")
-        said.append(
+        sentences.append(
             f"the fit had **not settled** after {steps} steps; do not rely on its intervals."
         )
     if not any(recording["pictures"] for recording in one.confidence["recordings"]):
-        said.append(
+        sentences.append(
             "no camera frame shows the recoil, so the damping is what other rubbers have; a launch"
             " would say most."
         )
-    return said
+    return sentences
 
 
 def _between(values: list[float], form: str = ".1f") -> str:

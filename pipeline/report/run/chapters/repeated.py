@@ -20,15 +20,19 @@ def claims(repeated: Repeated, params: Params) -> list[str]:
     """Ours beside the paper's method, then each finding of the paper's."""
     misses = repeated.miss[ALL]
     known = [f"**{name_of(m)}** {_mean(misses[m])}" for m in (OURS, paper.METHOD) if m in misses]
-    said = [f"On {max(one.count for one in misses.values())} further recordings of the rig's bands,"
+    count = max(one.count for one in misses.values())
+    sentences = [
+        f"On {count} further recordings of the rig's bands,"
         f" which took part in no choice though their bands did"
         f" ([table 1](#table-1), [data](validation/{FILE.name})),"
         f" launches without errors miss by {', '.join(known)}."]  # fmt: skip
     if changed := repeated.changed_settings(params):
         keys = ", ".join(one.key for one in changed)
-        said.append(f"These recordings were searched with other settings than this run: {keys}.")
-    said += [_claim(repeated, *claim) for claim in CLAIMS.items()]
-    return said + _why(repeated.ranks)
+        sentences.append(
+            f"These recordings were searched with other settings than this run: {keys}."
+        )
+    sentences += [_claim(repeated, *claim) for claim in CLAIMS.items()]
+    return sentences + _why(repeated.ranks)
 
 
 def _why(ranks: MeanInterval) -> list[str]:

@@ -1,4 +1,4 @@
-"""Which coordinates of the density hang on each other."""
+"""Which coordinates of the density depend on each other."""
 
 from __future__ import annotations
 

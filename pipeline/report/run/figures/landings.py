@@ -56,7 +56,7 @@ def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> Fi
                 where = {"transform": ax.get_yaxis_transform(), "fontsize": 7}
                 text = f"{failed} of {len(mine)} failed"
                 ax.text(0.01 if left else 0.99, row, text, **words, **where)
-    ax.set_xlabel(f"landing − target [cm]{beyond}")
+    [*found.values()][-1].set_xlabel(f"landing − target [cm]{beyond}")
     dot = {"ls": "", "color": "0.4"}
     entries: list[tuple[str, Artist]] = [
         (f"aimed at {t:g} m", mark(**dot, marker=m)) for t, m in targets.items()
@@ -97,7 +97,7 @@ def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> Fi
             ax.hlines(height, mine.low, mine.high, color=color, lw=0.9, ls=line, zorder=2)
             face = np.where(inside[mine.index], color, "none")
             ax.scatter(mine.off, height, s=9, facecolors=face, edgecolors=color, lw=0.7, zorder=3)
-    ax.set_xlabel(f"predicted / landed − 1 [%]{beyond}")
+    [*found.values()][-1].set_xlabel(f"predicted / landed − 1 [%]{beyond}")
     dot = {"ls": "", "marker": "o", "ms": 4, "color": "0.4"}
     entries = [("a launch", mark(**dot))]
     if not inside.all():

@@ -76,12 +76,12 @@ def _ticks(name: str, boxes: ParameterBoxes, shown: np.ndarray) -> tuple[list[fl
     box, factor = getattr(boxes, name), QUANTITIES[name].factor
     low, high = np.log10([box.low * factor, box.high * factor])
     decades = range(int(np.floor(low)), int(np.ceil(high)))
-    kept: list[tuple[float, str]] = []
+    ticks: list[tuple[float, str]] = []
     for numbers in ROUND:
         values = [number * 10.0**decade for decade in decades for number in numbers]
         places = ((np.log10(value) - low) / (high - low) for value in values)
         marked = zip(places, values, strict=True)
-        kept = [(at, f"{value:g}") for at, value in marked if shown[0] <= at <= shown[-1]]
-        if len(kept) >= FEW:
+        ticks = [(at, f"{value:g}") for at, value in marked if shown[0] <= at <= shown[-1]]
+        if len(ticks) >= FEW:
             break
-    return [at for at, _ in kept], [words for _, words in kept]
+    return [at for at, _ in ticks], [words for _, words in ticks]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
@@ -27,27 +29,26 @@ def pull(
     """
     figure = plt.figure(figsize=(WIDTH, 2.6 * len(episodes) + 0.9))
     entitle(figure, "A good simulation lies on the black curve and leaves little beside it")
-    grid = figure.add_gridspec(len(episodes), 1)
-    for number, (band, episode) in enumerate(episodes.items()):
-        of_band = ("force", "residual"), ("force", "clouds")
-        axes = figure.add_subfigure(grid[number]).subplot_mosaic([*of_band])
-        top, middle, bottom = (axes[name] for name in ("force", "residual", "clouds"))
+    grid = figure.add_gridspec(2 * len(episodes), 2)
+    for row, (band, episode) in zip(range(0, 2 * len(episodes), 2), episodes.items(), strict=True):
         held = _held(episode)
+        top = figure.add_subplot(grid[row : row + 2, 0])
+        middle, bottom = (figure.add_subplot(grid[place, 1]) for place in (row, row + 1))
         draw = np.linalg.norm(episode.position[held, 1:], axis=1)
         force = np.linalg.norm(episode.force, axis=1)
         top.plot(draw, force[held], color=INK, lw=2)
         taut = draw[force[held] > SLACK * force[held].max()]
         top.set_xlim(max(taut.min() - MARGIN, 0), draw.max() + MARGIN / 4)
         for (method, replay), dash in zip(replays.get(band, {}).items(), DASHES, strict=False):
-            style = {"color": styles[method].color, "lw": 1.3, "ls": dash}
+            style: dict[str, Any] = {"color": styles[method].color, "lw": 1.3, "ls": dash}
             top.plot(draw, np.linalg.norm(replay.force[held], axis=1), **style)
             left = np.linalg.norm(episode.force - replay.force, axis=1)
-            middle.plot(episode.time, left, **style | {"lw": 0.9})
-            dots = style | {"ls": "", "marker": ".", "ms": 3}
+            middle.plot(episode.time, left, **{**style, "lw": 0.9})
+            dots = {"color": styles[method].color, "ls": "", "marker": ".", "ms": 3}
             bottom.plot(episode.cloud_time, 100 * replay.distance, **dots)
         for ax in (middle, bottom):
             ax.axvline(episode.release_time, color="0.6", lw=0.8, zorder=0)
-            ax.set_xlim(episode.time[[0, -1]])
+            ax.set_xlim(episode.time[0], episode.time[-1])
         middle.tick_params(labelbottom=False)
         top.set(title=band, xlabel="draw: hand to fork [m]", ylabel="force of the band [N]")
         middle.set_ylabel("|residual| [N]")

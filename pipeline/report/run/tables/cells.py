@@ -43,8 +43,8 @@ def markdown(table: Table, repeats: bool = True) -> str:
 def without_empty(table: Table) -> Table:
     """Without the columns that have no number in any row."""
     heads, rows = table
-    kept = [n for n in range(len(heads)) if any(row[n] != NONE for row in rows)]
-    return [heads[n] for n in kept], [[row[n] for n in kept] for row in rows]
+    filled = [n for n in range(len(heads)) if any(row[n] != NONE for row in rows)]
+    return [heads[n] for n in filled], [[row[n] for n in filled] for row in rows]
 
 
 def without_repeats(rows: list[list[str]], columns: int = 2) -> list[list[str]]:

@@ -192,8 +192,8 @@ def prediction_summary(results: Results, styles: Styles) -> Table | None:
     heads = ["band", "method", "launches", "error inside the recorded stretch", "beyond it"]
     heads += ["bias [%]", "not predicted", "in the 90 % interval, inside", "beyond"]
     if not beyond:
-        kept = [n for n, head in enumerate(heads) if not head.startswith("beyond")]
-        heads, *rows = ([row[n] for n in kept] for row in (heads, *rows))
+        columns = [n for n, head in enumerate(heads) if not head.startswith("beyond")]
+        heads, *rows = ([row[n] for n in columns] for row in (heads, *rows))
     return (heads, rows) if rows else None
 
 

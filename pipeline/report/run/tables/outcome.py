@@ -52,7 +52,7 @@ def outcome(results: Results, references: tuple[str, ...], styles: Styles) -> Ta
             rows.append([name, f"{len(some[0])} {kind}", *cells, coverage(ranges.get("all"))])
     names = [styles[method].name for method in references]
     heads = ["band", "launches", *(f"{name} [cm]" for name in names)]
-    heads += ["actuation floor [cm]", f"{names[0]}, in floors", f"failed: {' · '.join(names)}"]
+    heads += ["actuation floor [cm]", f"{names[0]} / floor", f"failed: {' · '.join(names)}"]
     heads += ["prediction off by [%]", "bias [%]", "in the 90 % interval"]
     return without_empty((heads, rows)) if rows else None
 

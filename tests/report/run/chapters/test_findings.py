@@ -112,8 +112,8 @@ def test_whether_the_papers_findings_hold() -> None:
 def test_at_most_eight_sentences_of_a_whole_run() -> None:
     near = 0.05 + NOISE
     some = band("band1", **{m: near for m in (MAIN, THEIRS, "package_si", "de", "no_work")})
-    said = findings(run(*some))
-    assert len(said) <= 8 and said[-1] == f"{CAVEAT}."
+    message = findings(run(*some))
+    assert len(message) <= 8 and message[-1] == f"{CAVEAT}."
 
 
 def test_nothing_is_said_of_nothing() -> None:

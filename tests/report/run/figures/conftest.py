@@ -5,7 +5,7 @@ from pipeline.report.drawing import canvas
 
 
 @pytest.fixture
-def kept(monkeypatch) -> list[plt.Figure]:
+def retained(monkeypatch) -> list[plt.Figure]:
     """Figures that were drawn, in place of their files."""
     figures: list[plt.Figure] = []
     monkeypatch.setattr(canvas, "save", lambda figure, *_: figures.append(figure))

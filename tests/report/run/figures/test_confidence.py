@@ -7,9 +7,9 @@ from pipeline.report.run.figures import confidence
 from tests.report.run.conftest import BAND, METHOD
 
 
-def test_correlations_are_written_into_half_of_their_cells(kept, result) -> None:
+def test_correlations_are_written_into_half_of_their_cells(retained, result) -> None:
     confidence.correlation("", {BAND: result.confidence, "other": result.confidence})
-    first, second, _ = kept[0].axes
+    first, second, _ = retained[0].axes
     assert (first.get_title(), second.get_title()) == (BAND, "other")
     (image,) = first.images
     np.testing.assert_array_equal(image.get_array(), result.confidence["correlation"]["matrix"])

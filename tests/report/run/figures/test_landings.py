@@ -31,9 +31,9 @@ def words(figure) -> list[str]:
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def test_every_launch_lies_as_far_off_as_it_landed(kept) -> None:
+def test_every_launch_lies_as_far_off_as_it_landed(retained) -> None:
     landings.misses("", trials(), {BAND: 0.02}, styles(METHODS))
-    first, second = kept[0].axes
+    first, second = retained[0].axes
     found = dots(first)
     assert sorted(found) == [0, 1]
     for row in found.values():
@@ -44,28 +44,28 @@ def test_every_launch_lies_as_far_off_as_it_landed(kept) -> None:
     np.testing.assert_allclose([floor.get_x(), floor.get_width()], [-2, 4])
     names = [label.get_text() for label in first.get_yticklabels()]
     assert names == ["Sling2Sim2Real", "DE_L"]
-    assert {"measured (hollow)", "aimed at 1.725 m"} <= set(words(kept[0]))
+    assert {"measured (hollow)", "aimed at 1.725 m"} <= set(words(retained[0]))
 
 
-def test_a_landing_outside_the_area_is_a_failure_and_no_dot(kept) -> None:
+def test_a_landing_outside_the_area_is_a_failure_and_no_dot(retained) -> None:
     outside = launches().assign(landing_y=[1.745, 1.0, 1.965, 2.6])
     landings.misses("", outside, {}, styles([METHOD]))
-    (ax,) = kept[0].axes
+    (ax,) = retained[0].axes
     np.testing.assert_allclose(sorted(dots(ax)[0]), [2, 4])
     assert [text.get_text() for text in ax.texts] == ["2 of 4 failed"]
-    assert not any("floor" in word for word in words(kept[0]))
+    assert not any("floor" in word for word in words(retained[0]))
 
 
-def test_what_is_far_off_lies_on_a_logarithmic_axis_that_says_so(kept) -> None:
+def test_what_is_far_off_lies_on_a_logarithmic_axis_that_says_so(retained) -> None:
     for off, words in ((0.05, ""), (0.2, ", logarithmic beyond ± 10")):
         trials = launches()
         landings.misses("", trials.assign(landing_y=trials.target + off), {}, styles([METHOD]))
-        assert kept[-1].axes[0].get_xlabel() == f"landing − target [cm]{words}"
+        assert retained[-1].axes[0].get_xlabel() == f"landing − target [cm]{words}"
 
 
-def test_predictions_lie_in_intervals_that_are_called_what_they_are(kept) -> None:
+def test_predictions_lie_in_intervals_that_are_called_what_they_are(retained) -> None:
     landings.predictions("", trials(), {(BAND, METHOD)}, styles(METHODS))
-    (ax,) = kept[0].axes  # nothing landed on the other band
+    (ax,) = retained[0].axes  # nothing landed on the other band
     for row in dots(ax).values():
         np.testing.assert_allclose(sorted(row), sorted(ERRORS))
     lines = [one for one in ax.collections if hasattr(one, "get_segments")]
@@ -74,13 +74,13 @@ def test_predictions_lie_in_intervals_that_are_called_what_they_are(kept) -> Non
     ends = np.array([segment[:, 0] for segment in lines[0].get_segments()])
     widths = 100 * 0.05 / np.array([1.695, 1.745, 1.965])
     np.testing.assert_allclose(ends[:, 1] - ends[:, 0], widths)
-    assert {"90 % interval", "90 % by the draw's error alone"} <= set(words(kept[0]))
+    assert {"90 % interval", "90 % by the draw's error alone"} <= set(words(retained[0]))
     landings.predictions("", launches(), {(BAND, METHOD)}, styles([METHOD]))
-    assert "90 % by the draw's error alone" not in words(kept[1])
+    assert "90 % by the draw's error alone" not in words(retained[1])
 
 
-def test_launches_without_intervals_are_drawn_too(kept) -> None:
+def test_launches_without_intervals_are_drawn_too(retained) -> None:
     bare = launches().assign(predicted_low=np.nan, predicted_high=np.nan)
     landings.predictions("", bare, {(BAND, METHOD)}, styles([METHOD]))
-    assert not any("90 %" in word for word in words(kept[0]))
-    np.testing.assert_allclose(sorted(dots(kept[0].axes[0])[0]), sorted(ERRORS))
+    assert not any("90 %" in word for word in words(retained[0]))
+    np.testing.assert_allclose(sorted(dots(retained[0].axes[0])[0]), sorted(ERRORS))

@@ -16,10 +16,10 @@ HELD = (STILL.time >= 1) & (STILL.time <= 8 - 2 * STILL.sample_period)
 SIZE = np.hypot(STILL.time, np.sin(STILL.time))
 
 
-def test_force_over_draw_and_what_is_left_over_time(kept) -> None:
+def test_force_over_draw_and_what_is_left_over_time(retained) -> None:
     played = toy_replay(None, "", METHOD, RECORDED, {})
     pull("", {BAND: RECORDED}, {BAND: {METHOD: played}}, styles([METHOD]))
-    top, middle, bottom = kept[0].axes
+    top, middle, bottom = retained[0].axes
     measured, simulated = top.lines
     np.testing.assert_allclose(measured.get_xdata(), DEPTH[HELD])  # from grasp to release
     np.testing.assert_allclose(measured.get_ydata(), SIZE[HELD])
@@ -29,7 +29,7 @@ def test_force_over_draw_and_what_is_left_over_time(kept) -> None:
     np.testing.assert_allclose(bottom.lines[0].get_ydata(), 1.0)  # cm
 
 
-def test_a_recording_alone_is_drawn_too(kept) -> None:
+def test_a_recording_alone_is_drawn_too(retained) -> None:
     pull("", {BAND: RECORDED}, {}, {})
-    assert len(kept[0].axes[0].lines) == 1
-    assert [text.get_text() for text in kept[0].legends[0].get_texts()] == ["measured"]
+    assert len(retained[0].axes[0].lines) == 1
+    assert [text.get_text() for text in retained[0].legends[0].get_texts()] == ["measured"]

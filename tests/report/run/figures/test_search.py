@@ -16,11 +16,11 @@ def pairs(figure: plt.Figure) -> list[plt.Axes]:
     return [ax for ax in figure.axes if ax.get_xlim() == ax.get_ylim() == (0, 1)]
 
 
-def test_convergence_draws_the_printed_loss_of_the_best_so_far(kept, result) -> None:
+def test_convergence_draws_the_printed_loss_of_the_best_so_far(retained, result) -> None:
     """Of a fit that keeps one row, that row stands where its rollouts end."""
     fitted = replace(result, theta=result.theta | {"rollouts": 60})
     search.convergence("", {BAND: {METHOD: result, "de": fitted}}, styles([METHOD, "de"]))
-    (ax,) = kept[0].axes
+    (ax,) = retained[0].axes
     steps, end, other, _ = ax.lines
     assert steps.get_xdata().tolist() == [1, 2, 3, 4, 5]
     assert other.get_xdata().tolist() == [1, 2, 3, 4, 60]
@@ -30,10 +30,10 @@ def test_convergence_draws_the_printed_loss_of_the_best_so_far(kept, result) -> 
     assert steps.get_linestyle() != other.get_linestyle()
 
 
-def test_the_corner_shows_every_pair_of_parameters(kept, result, params) -> None:
+def test_the_corner_shows_every_pair_of_parameters(retained, result, params) -> None:
     search.corner("", result, params.parameters, "x")
-    assert len(pairs(kept[0])) == 5 * 4 / 2
-    for ax in pairs(kept[0]):
+    assert len(pairs(retained[0])) == 5 * 4 / 2
+    for ax in pairs(retained[0]):
         points = ax.collections[0].get_offsets()
         assert len(points) == 4  # the failed one is a cross
         crosses = [line for line in ax.lines if line.get_marker() == "x"]
@@ -47,28 +47,28 @@ def test_the_corner_shows_every_pair_of_parameters(kept, result, params) -> None
         np.testing.assert_allclose(way.get_xdata(), [0.4, 0.25, 0.75])  # centre, two iterations
 
 
-def test_an_ellipse_lies_along_its_covariance(kept, result, params) -> None:
+def test_an_ellipse_lies_along_its_covariance(retained, result, params) -> None:
     sigma = 0.01 * np.eye(5)
     sigma[0, 1] = sigma[1, 0] = 0.009
     result.regions[0].sigma[:] = sigma
     search.corner("", result, params.parameters, "x")
-    first = pairs(kept[0])[0]
+    first = pairs(retained[0])[0]
     (ellipse,) = (patch for patch in first.patches if isinstance(patch, Ellipse))
     assert ellipse.angle % 180 == pytest.approx(45)
     assert ellipse.width == pytest.approx(2 * np.sqrt(0.019))
     assert ellipse.height == pytest.approx(2 * np.sqrt(0.001))
 
 
-def test_axes_that_are_held_fixed_are_left_out(kept, result, params) -> None:
+def test_axes_that_are_held_fixed_are_left_out(retained, result, params) -> None:
     for name in ("poissons_ratio", "elasticity_damping", "damping_scale"):
         result.history[f"unit_{name}"] = 0.5
     search.corner("", result, params.parameters, "x")
-    assert len(pairs(kept[0])) == 1
+    assert len(pairs(retained[0])) == 1
 
 
-def test_ticks_stand_at_round_physical_values(kept, result, params) -> None:
+def test_ticks_stand_at_round_physical_values(retained, result, params) -> None:
     search.corner("", result, params.parameters, "x")
-    ax = next(ax for ax in kept[0].axes if ax.get_xlabel() == "d [ms]")
+    ax = next(ax for ax in retained[0].axes if ax.get_xlabel() == "d [ms]")
     box = params.parameters.elasticity_damping
     for place, label in zip(ax.get_xticks(), ax.get_xticklabels(), strict=True):
         seconds = box.low * (box.high / box.low) ** place

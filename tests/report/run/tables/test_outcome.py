@@ -35,7 +35,7 @@ def test_a_row_a_band_with_errors_predictions_and_failures() -> None:
         "ours [cm]": "2.0",
         "Sling2Sim2Real [cm]": "N/A",
         "actuation floor [cm]": "1.0",
-        "ours, in floors": "2.0",
+        "ours / floor": "2.0",
         "failed: ours · Sling2Sim2Real": "0 · 15",
         "prediction off by [%]": "2.0",
         "bias [%]": "-2.0",
@@ -51,10 +51,10 @@ def test_the_pull_with_a_dip_has_a_row_below_its_band() -> None:
     )
     dip = InformativePull("band1", launches([[0.01, -0.01]] * 3))
     heads, (first, second) = outcome(replace(ran, dips={"band1_dip": dip}), (MAIN, THEIRS), NAMED)
-    told = dict(zip(heads, second, strict=True))
+    summary = dict(zip(heads, second, strict=True))
     assert first[0] == "band1" and second[0] == "band1, pull with a dip"
-    assert (told["ours [cm]"], told["Sling2Sim2Real [cm]"]) == ("1.0", NONE)
-    assert (told["actuation floor [cm]"], told["ours, in floors"]) == ("1.0", "1.0")
+    assert (summary["ours [cm]"], summary["Sling2Sim2Real [cm]"]) == ("1.0", NONE)
+    assert (summary["actuation floor [cm]"], summary["ours / floor"]) == ("1.0", "1.0")
 
 
 def test_measured_launches_without_a_target_have_predictions_alone() -> None:

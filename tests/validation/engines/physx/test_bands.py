@@ -87,9 +87,9 @@ def test_our_own_motion_compared_with_itself_differs_in_nothing(sling):
 def test_without_physx_one_line_says_how_to_get_it(monkeypatch):
     monkeypatch.setenv(bands.INTERPRETER, "")  # this Python
     monkeypatch.setattr(bands, "ASK", bands.ASK.replace("ovstage", "no-such-engine"))
-    with pytest.raises(UserError, match="no-such-engine.*pip install") as said:
+    with pytest.raises(UserError, match="no-such-engine.*pip install") as message:
         bands.release()
-    assert "\n" not in str(said.value)
+    assert "\n" not in str(message.value)
 
 
 def test_a_python_that_is_not_there_is_named(monkeypatch):

@@ -102,5 +102,5 @@ def test_measured_landings_stand_beside_their_draws(searched, monkeypatch, tmp_p
     content = json.loads(searched.read_text())
     assert content["command"].endswith("search band1 --landings CSV")
     for rows in (content["launches"]["draws"], content["launches_in_our_simulator"]):
-        told = [(*row["draw_m"], row["measured_m"]) for row in rows]
-        assert told == [(-0.30, -0.17, 2.2), (-0.32, -0.20, 3.1)]
+        summary = [(*row["draw_m"], row["measured_m"]) for row in rows]
+        assert summary == [(-0.30, -0.17, 2.2), (-0.32, -0.20, 3.1)]

@@ -1,6 +1,6 @@
 """Episodes that a check of a recording makes anyway, kept for the stage that makes them next.
 
-They lie in .checkpoints/ under a key of all that they hang on: whoever asks with anything changed
+They lie in .checkpoints/ under a key of all that they depend on: whoever asks with anything changed
 finds none, and makes them.
 """
 

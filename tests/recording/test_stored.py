@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.base.layout import Layout
 from pipeline.params import Params
-from pipeline.recording import kept
+from pipeline.recording import stored
 from pipeline.recording.build import build_episodes
 
 
@@ -16,7 +16,7 @@ def layout(tmp_path: Path, seen, params) -> Layout:
     """Of a project that keeps the episode of a recording of band1."""
     layout = Layout(tmp_path)
     episodes, _ = build_episodes(seen[0], "band1", params)
-    kept.keep(seen[0], episodes, params, layout)
+    stored.keep(seen[0], episodes, params, layout)
     return layout
 
 
@@ -32,7 +32,7 @@ def test_what_is_kept_is_what_would_be_made(layout, seen, params, monkeypatch) -
     (made,), _ = build_episodes(seen[0], "band1", params)
     made.save(layout.root / "made")
     monkeypatch.setattr("pipeline.recording.build.build_episodes", never)
-    (found,), refused = kept.episodes_of(seen[0], "band1", params, layout)
+    (found,), refused = stored.episodes_of(seen[0], "band1", params, layout)
     found.save(layout.root / "found")
     assert files(layout.root / "found") == files(layout.root / "made") and not refused
 
@@ -45,15 +45,15 @@ def changed(params: Params, section: str, **values) -> Params:
 def test_anything_changed_makes_it_again(layout, seen, params, monkeypatch) -> None:
     monkeypatch.setattr("pipeline.recording.build.build_episodes", lambda *_: "made")
 
-    def asked(path: Path = seen[0], band: str = "band1", params: Params = params):
-        return kept.episodes_of(path, band, params, layout)
+    def requested(path: Path = seen[0], band: str = "band1", params: Params = params):
+        return stored.episodes_of(path, band, params, layout)
 
-    assert asked() != "made"
+    assert requested() != "made"
     other = shutil.copy(seen[0], layout.root / "other.mcap")
-    assert asked(path=other) == "made"  # an episode says of which file it is
-    assert asked(band="band2") == "made"
-    assert asked(params=changed(params, "force", cutoff=0.2)) == "made"
-    assert asked(params=changed(params, "cloud", mask="folder")) == "made"
-    kept.forget("band1", layout)
-    assert asked() == "made"
+    assert requested(path=other) == "made"  # an episode says of which file it is
+    assert requested(band="band2") == "made"
+    assert requested(params=changed(params, "force", cutoff=0.2)) == "made"
+    assert requested(params=changed(params, "cloud", mask="folder")) == "made"
+    stored.forget("band1", layout)
+    assert requested() == "made"
     assert not (layout.root / ".checkpoints/band1-episodes").exists()

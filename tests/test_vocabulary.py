@@ -1,0 +1,15 @@
+"""The words that names and prose do not use."""
+
+from tools.vocabulary import main, names, phrases
+
+
+def test_the_project_keeps_to_its_words(capsys) -> None:
+    assert main() == 0, capsys.readouterr().out
+
+
+def test_a_word_is_found_where_it_is_a_name_and_a_phrase_where_it_is_prose() -> None:
+    code = 'told = row.said  # told\nprint("asked")\n'
+    assert list(names(code)) == [(1, "told"), (1, "said")]
+    wrong = "hangs " + "on"  # in two parts: this file is searched too
+    text = f"It depends on it.\nThe weight {wrong} its bands; the force {wrong} the draw.\n"
+    assert [(line, words) for line, words, _ in phrases(text)] == [(2, wrong)]

@@ -22,15 +22,15 @@ auto in_hand = [](int) -> SC { return 0; };           // a place from the hand's
 // the joint, coefficients of bending and twist, residual of this section and of the next
 enum { OWN = 0, STRETCH = 45, TWIST = 51, TWIST_NEXT = 57, BEND = 63, TWISTING = 64, FORCE = 65, FORCE_NEXT = 74, NOTHING = 83, STAGED = 84 };
 #if defined(__CUDA_ARCH__)
-__shared__ SC staged[STAGED * (L | 1)], hand_force[54];
+__shared__ SC staged[STAGED * (L | 1)], hand_terms[54];
 #define PUT(v) staged[(v) * (L | 1) + i]
 #define GET(v, j) staged[(v) * (L | 1) + (j)]
 #else
-real staged[STAGED], hand_force[54];
+real staged[STAGED], hand_terms[54];
 #define PUT(v) staged[v]
 #define GET(v, j) staged[v]
 #endif
-#define HAND(v) hand_force[v]
+#define HAND(v) hand_terms[v]
 #define RESIDUAL(m, j) GET(FORCE + (m), j)
 #define RESIDUAL_NEXT(m, j) GET(FORCE_NEXT + (m), j)
 #define LOWER(m, n) ((m) >= (n) ? (m) * ((m) + 1) / 2 + (n) : (n) * ((n) + 1) / 2 + (m))

@@ -39,17 +39,17 @@ real own[N][N], following[N][N], across[N][N], force_here[N], force_there[N];
 #define RESIDUAL(m, j) force_here[m]
 #define RESIDUAL_NEXT(m, j) force_there[m]
 // of the slabs on both sides of the hand: force on the held section, and what it has of the other section's degrees of freedom
-real hand_force[2][3], hand_force_of[2][3][N];
+real hand_terms[2][3], hand_terms_of[2][3][N];
 
 // drag of the air on the moving band, which the projectile does not feel
 auto wind_of = [&](int i, int m) -> real { return air * (mass_of(i, m) - (i == MID ? share(m) * payload : zero)); };
 auto feel_wind = [](bool) {};  // a cylinder's drag: the rod alone knows it
 auto wind_on = [&](int i, int m) -> real { return wind_of(i, m) * (X(m, i) - Y(m, i)); };
 auto hand_force = [&](int c, real scale) -> real {  // on the held section, after Newton's change times `scale`, to first order
-  real force = hand_force[0][c] + hand_force[1][c];
+  real force = hand_terms[0][c] + hand_terms[1][c];
   for (int m = c; m < N; m += 3) force += mass_of(MID, m) * ibh2 * (X(m, MID) - XH(m, MID)) + wind_on(MID, m);
   for (int m = 0; m < N; ++m)
-    force -= scale * (hand_force_of[0][c][m] * DX(m, MID - 1) + hand_force_of[1][c][m] * DX(m, MID + 1));
+    force -= scale * (hand_terms_of[0][c][m] * DX(m, MID - 1) + hand_terms_of[1][c][m] * DX(m, MID + 1));
   return force;
 };
 
@@ -100,11 +100,11 @@ auto stage_slab = [&](int i) {
   }
   if (i == MID - 1 || i == MID) for (int c = 0; c < 3; ++c) {
     const int side = i - MID + 1;
-    hand_force[side][c] = zero;
-    for (int m = c; m < N; m += 3) hand_force[side][c] += side ? force_here[m] : force_there[m];
+    hand_terms[side][c] = zero;
+    for (int m = c; m < N; m += 3) hand_terms[side][c] += side ? force_here[m] : force_there[m];
     for (int n = 0; fresh && n < N; ++n) {
-      hand_force_of[side][c][n] = zero;
-      for (int m = c; m < N; m += 3) hand_force_of[side][c][n] += side ? across[n][m] : across[m][n];
+      hand_terms_of[side][c][n] = zero;
+      for (int m = c; m < N; m += 3) hand_terms_of[side][c][n] += side ? across[n][m] : across[m][n];
     }
   }
 };

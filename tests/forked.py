@@ -70,7 +70,7 @@ def main() -> None:
                 _child(module, json.loads(line), message.fileno())
             status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
             message.seek(0)
-            print(json.dumps({"returncode": status, "said": message.read()}), flush=True)
+            print(json.dumps({"returncode": status, "message": message.read()}), flush=True)
 
 
 if __name__ == "__main__":

@@ -182,7 +182,7 @@ def test_a_given_delay_that_the_recording_does_not_show(looked_at, params, monke
     assert found.camera == Estimate(0.0, 0.005, "setup", False, 0.005, given=0.0)
 
 
-@pytest.mark.parametrize("told", [0.0, 0.03])
+@pytest.mark.parametrize("summary", [0.0, 0.03])
 def test_a_given_delay_that_is_wrong_is_put_right(looked_at, params, summary) -> None:
     """The camera is 12 ms late, whatever was given."""
     recording, geometry = looked_at

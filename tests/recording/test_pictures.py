@@ -67,7 +67,7 @@ def written(pixels: np.ndarray, factor: float, kind: type, swapped: bool = False
 
 
 @pytest.mark.parametrize(
-    "factor, kind, swapped, said",
+    "factor, kind, swapped, output",
     [
         (
             10,

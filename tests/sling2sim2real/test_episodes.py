@@ -57,7 +57,7 @@ def test_large_clouds_are_thinned_and_episodes_are_kept(tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "message"),
     [
         ({"position": np.zeros((7, 2))}, r"position: must have shape \(5000, 3\), got \(7, 2\)"),
         ({"force": np.full((5000, 3), np.nan)}, "force: holds NaN"),

@@ -65,7 +65,7 @@ def test_theta_is_read_as_it_is_written(tmp_path, rubber) -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    ("values", "message"),
     [
         ({"youngs_modulus": -1.0}, "theta.youngs_modulus: must be between"),
         ({"youngs_modulus": "2e5"}, "theta.youngs_modulus: must be a number"),
@@ -79,7 +79,7 @@ def test_a_theta_that_cannot_be(values: dict, message: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("sizes", "said"),
+    ("sizes", "message"),
     [
         ((23.0, 0.010, 0.52), "Band: mass: must be between 0.0001 and 1, got 23"),
         (("23 g", 0.010, 0.52), "Band: mass: must be a number"),

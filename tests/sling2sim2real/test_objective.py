@@ -53,7 +53,7 @@ def test_what_no_simulation_can_follow_is_infinite(world, episode) -> None:
 
 
 @pytest.mark.parametrize(
-    ("points", "said"),
+    ("points", "message"),
     [(np.zeros(5), r"must have shape \(N, 5\)"), (np.full((1, 5), 1.5), "in the unit cube")],
 )
 def test_wrong_points(world, episode, points, message: str) -> None:

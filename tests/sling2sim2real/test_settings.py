@@ -44,7 +44,7 @@ def test_a_file_of_ones_own(tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"setup": {"fork_width": 5.0}}, "settings: setup.fork_width: must be between 0.02 and 2"),
         ({"setup": {"width": 0.3}}, "settings: setup.width: unknown key"),

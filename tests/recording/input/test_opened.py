@@ -58,7 +58,7 @@ def test_a_split_bag_of_packed_parts(whole, tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    "first, said",
+    "first, message",
     [
         (b"version https://git-lfs.github.com/spec/v1\noid sha256:0", "git lfs pull"),
         (b"#ROSBAG V2.0\n", "rosbags-convert --src"),

@@ -98,7 +98,7 @@ def test_several_misses_ask_for_mass_and_size_first() -> None:
     assert "clock" in reasons[1].cure and "box of draws" in reasons[2].cure
 
 
-@pytest.mark.parametrize(("density", "asked"), [(1000.0, False), (833.0, True), (1400.0, True)])
+@pytest.mark.parametrize(("density", "requested"), [(1000.0, False), (833.0, True), (1400.0, True)])
 def test_a_density_that_no_solid_rubber_has_is_asked_about(density, requested) -> None:
     found = replace(GOOD, density=density)
     assert bool(question(found)) is requested and judge(found) == (TRUSTED, [])

@@ -158,7 +158,7 @@ def parser(
         options.add_argument(
             "--workers", type=int, default=cores(), help="processes (default: cores)"
         )
-        options.add_argument(
-            "--minutes", type=float, default=1e4, help="then it ends; again: goes on"
-        )
+    if minutes:
+        end = "then it ends; the same command goes on"
+        options.add_argument("--minutes", type=float, default=1e4, help=end)
     return options

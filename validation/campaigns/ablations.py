@@ -274,7 +274,7 @@ def run(args: argparse.Namespace) -> None:
 def main() -> None:
     params = with_variants(load())
     usual = [name for name in params.methods if name not in BESIDE]
-    parser = runner.parser(__doc__, REPORT, WORK)
+    parser = runner.parser(__doc__, REPORT, WORK, minutes=True)
     parser.add_argument("--record", action="store_true", help="make the episodes, nothing else")
     parser.add_argument("--report-only", action="store_true", help="of what is there")
     parser.add_argument("--preset", help="of presets/, its keys of `optimizer`")
@@ -283,7 +283,6 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=FIRST, help="rig seed of the first recording")
     parser.add_argument("--recordings", type=int, default=10, help="a band (default: 10)")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="on the first (default: 5)")
-    parser.add_argument("--minutes", type=float, default=1e4, help="then stop and report")
     args = parser.parse_args()
     for kind in ("band", "method"):
         for name in getattr(args, f"{kind}s"):

@@ -112,8 +112,7 @@ def figures(lines: list[dict]) -> dict:
 
 
 def main() -> None:
-    parser = runner.parser(str(__doc__), REPORT, WORK)
-    parser.add_argument("--minutes", type=float, default=1e4, help="then it ends; again: goes on")
+    parser = runner.parser(str(__doc__), REPORT, WORK, minutes=True)
     args = parser.parse_args()
     work, todo = args.work.resolve(), [Recorded(b, n) for n in range(TEN) for b in BANDS]
     results = ResultLines(work / "results.jsonl")

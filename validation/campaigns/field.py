@@ -269,12 +269,11 @@ def block(content: dict) -> str:
 
 
 def main() -> None:
-    parser = runner.parser(str(__doc__), REPORT, WORK)
+    parser = runner.parser(str(__doc__), REPORT, WORK, minutes=True)
     parser.add_argument("--orange", type=Path, help="folder of its recordings")
     parser.add_argument("--report-only", action="store_true", help="of what is there")
     parser.add_argument("--page", action="store_true", help=f"only write its table into {PAGE}")
     parser.add_argument("--faults", nargs="+", default=[*FAULTS], help="(default: all)")
-    parser.add_argument("--minutes", type=float, default=1e4, help="at most (default: all of it)")
     args = parser.parse_args()
     if args.page:
         content = json.loads(made(args.report).read_text(encoding="utf-8"))

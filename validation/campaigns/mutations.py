@@ -187,9 +187,8 @@ def _named(one: Result) -> Result:
 
 
 def main() -> None:
-    parser = runner.parser(__doc__, REPORT, WORK)
+    parser = runner.parser(__doc__, REPORT, WORK, minutes=True)
     parser.add_argument("--count", type=int, default=20_000, help="recordings (default: 20000)")
-    parser.add_argument("--minutes", type=float, default=1e4, help="then stop and report")
     args = parser.parse_args()
     if min(args.count, args.workers) < 1:
         raise UserError("--count, --workers: from 1 on")

@@ -70,8 +70,7 @@ def figures(lines: list[dict]) -> dict:
 
 
 def main() -> None:
-    parser = runner.parser(str(__doc__), REPORT, WORK)
-    parser.add_argument("--minutes", type=float, default=1e4, help="then it ends; again: goes on")
+    parser = runner.parser(str(__doc__), REPORT, WORK, minutes=True)
     parser.add_argument("--episodes", type=int, default=EPISODES, help="of each pull, at most")
     parser.add_argument("--report-only", action="store_true", help="of what is there")
     args = parser.parse_args()

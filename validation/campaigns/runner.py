@@ -147,8 +147,10 @@ def plain(value: object, digits: int | None = None):
     return value.item() if isinstance(value, np.generic) else value
 
 
-def parser(doc: str, report: Path, work: Path | None = None) -> argparse.ArgumentParser:
-    """A campaign's arguments: --report, and for one of many jobs --workers and --work."""
+def parser(
+    doc: str, report: Path, work: Path | None = None, minutes: bool = False
+) -> argparse.ArgumentParser:
+    """A campaign's arguments: --report; of many jobs --workers and --work; and --minutes."""
     options = argparse.ArgumentParser(description=doc.partition("\n")[0])
     options.add_argument("--report", type=Path, default=report, help=f"(default: {report})")
     if work is not None:
@@ -156,4 +158,7 @@ def parser(doc: str, report: Path, work: Path | None = None) -> argparse.Argumen
         options.add_argument(
             "--workers", type=int, default=cores(), help="processes (default: cores)"
         )
+    if minutes:
+        end = "then it ends; the same command goes on"
+        options.add_argument("--minutes", type=float, default=1e4, help=end)
     return options

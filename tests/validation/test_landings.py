@@ -19,9 +19,10 @@ def test_each_band_is_recorded_by_both_pulls_and_once_after_it_was_drawn() -> No
         other = [one for one in every if one.launched or one.method != OURS]
         assert {one.kind for one in other} == {
             "paper, virgin, the paper's method",
+            "informative, virgin, the paper's method",
             "informative, virgin, one launch",
         }
-        assert len(other) == 2 * len(bands) and {one.number for one in other} == {0}
+        assert len(other) == 3 * len(bands) and {one.number for one in other} == {0}
         every = [one for one in every if one not in other]
         virgin = [one for one in every if not one.worn]
         assert len(virgin) == 2 * count * len(bands)

@@ -10,9 +10,9 @@ import numpy as np
 
 from pipeline.base.weight import READINGS
 from pipeline.identify.results.theta import calibrated, parameters_of
-from pipeline.launching.hanging import hanging_stretch
 from pipeline.params import Params
 from pipeline.report.drawing.styles import Styles
+from pipeline.report.run.hanging import hanging_stretch
 from pipeline.report.run.noise import landed
 from pipeline.report.run.results import Result, Results
 from pipeline.report.run.tables.benchmark import band_name, ordered

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.base.weight import READINGS, tension
-from pipeline.launching.hanging import hanging_stretch
+from pipeline.report.run.hanging import hanging_stretch
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
 

@@ -272,8 +272,8 @@ def sentence(content: dict) -> str:
         f"On {len(bands)} further virtual rubbers, which took part in no choice, by one dip:"
         f" predictions are off by {size:.1f} % of the distance in the mean over rubbers"
         f" ({abs(worst):.1f} % at worst), and {inside:.0f} % of the launches land in their 90 %"
-        f" intervals, which are {width:.0f} % of the distance wide. By the paper's pull it is"
-        f" {ours:.1f} %, and {theirs:.1f} % by the paper's method."
+        f" intervals, which are {width:.0f} % of the distance wide. By the paper's pull they"
+        f" are off by {ours:.1f} %, the paper's method by {theirs:.1f} %."
     )
     return f"{begin}{fill(text, LINE)}\n{end}"
 

@@ -83,12 +83,6 @@ class OneRecording:
     launched: bool = False
 
     @property
-    def name(self) -> str:
-        """Of its episode."""
-        state = "worn" if self.worn else "virgin"
-        return f"{self.band}-{self.pull}-{state}-{self.number}"
-
-    @property
     def kind(self) -> str:
         """What the figures take together: all recordings of all bands."""
         parts = [self.pull, "worn" if self.worn else "virgin"]
@@ -129,10 +123,10 @@ def identified(job: OneRecording, work: Path, keep: bool = False) -> dict:
     """Scores of a method by one recording, and what it says of itself.
 
     Args:
-        keep: The episode, in a folder of `work`; one that is there is taken as it is.
+        keep: The episode, in a folder of the job's own; one that is there is taken as it is.
     """
     params, begin = job.params, time.process_time()
-    folder = work / (job.name if keep else fingerprint(repr(job)))
+    folder = work / fingerprint(repr(job))
     episode = recorded(params, job.band, folder)
     sling, start = sling_of(params, job.band, job.method, folder), time.process_time()
     outcome, confidence = found(params, job.method, sling, [episode])

@@ -116,6 +116,8 @@ def _seen(done: Processed, params: Params) -> list[Moment]:
 def _whole(
     figure: Figure, done: Processed, facts: SignalSummary, rows: list[PictureLine], params: Params
 ) -> None:
+    from pipeline.report.drawing.canvas import key, mark  # imports Matplotlib
+
     seen, start = _seen(done, params), facts.window_start_s
     grid = figure.add_gridspec(5, len(seen), height_ratios=[0.88, 0.55, 0.92, 1.0, 0.55])
     for column, one in enumerate(seen):
@@ -131,6 +133,17 @@ def _whole(
     covered = figure.add_subplot(grid[4, :], sharex=force)
     _coverage(covered, rows)
     _events(covered, done, facts)
+    key(
+        figure,
+        [
+            ("mask of the band", mark(color="#ff00ff")),
+            ("points of the band", mark(ls="", marker=".", color=COLORS[1])),
+            ("tips of the fork", mark(ls="", marker="^", color=INK)),
+            ("hand", mark(ls="", marker="s", color=COLORS[2], mec=INK)),
+            ("from tip to hand, while the band is taut", mark(color=COLORS[0])),
+            ("fork", mark(color="0.7", lw=2)),
+        ],
+    )
 
 
 def _overlaid(color: np.ndarray, mask: np.ndarray) -> np.ndarray:

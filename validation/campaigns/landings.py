@@ -194,6 +194,12 @@ def job_of(line: dict) -> OneRecording:
     return OneRecording(**{field.name: line[field.name] for field in fields(OneRecording)})
 
 
+def brief(line: dict) -> dict:
+    """What a report has of a line of results: its job, scores and whether the fit settled."""
+    short = {name: value for name, value in line.items() if name not in ("told", "delays")}
+    return short | ({"settled": line["told"]["settled"]} if "told" in line else {})
+
+
 def together(of_bands: dict[str, dict]) -> dict:
     """Means over bands, and of the coverage what bands drawn anew say in 90 of 100 cases."""
     bias = np.array([one["mean_bias"] for one in of_bands.values()])
@@ -307,7 +313,7 @@ def main() -> int:
         "jobs": [len(lines), len(todo)],
         "plan.dips": [dict(one) for one in load(DEFAULTS).plan.dips],
         "figures": figures(lines),
-        "recordings": lines,
+        "recordings": plain([brief(one) for one in lines], 4),
     }
     write_json(report_of(arguments.set), report)
     for name, about in report["figures"].items():

@@ -136,7 +136,7 @@ def _whole(
     key(
         figure,
         [
-            ("mask of the band", mark(color="#ff00ff")),
+            ("mask of the band", mark(color=np.array(MASK[::-1]) / 255)),
             ("points of the band", mark(ls="", marker=".", color=COLORS[1])),
             ("tips of the fork", mark(ls="", marker="^", color=INK)),
             ("hand", mark(ls="", marker="s", color=COLORS[2], mec=INK)),

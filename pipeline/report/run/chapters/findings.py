@@ -100,19 +100,19 @@ def _predictions(report: Report, kind: str) -> list[str]:
     if not errors:
         return []
     name = report.styles[report.main].name
-    sentences = (
+    sentence = (
         f"{name[0].upper()}{name[1:]} predicts where its {kind} launches land within"
         f" {_between(errors)} % of the distance on average (bias {_between(biases, '+.1f')} %)."
     )
     if not count:
-        return [sentences]
+        return [sentence]
     text = f"{held} of these {count} landings lie in their 90 % interval,"
     text += f" which is {_between(widths)} % wide"
     if held < ENOUGH * count:
         text += ": too few, so the intervals are too narrow"
     elif np.mean(widths) / 2 > WIDE * 100 * np.mean(off):
         text += ": wider than such errors call for"
-    return [sentences, f"{text}."]
+    return [sentence, f"{text}."]
 
 
 def _beside(report: Report, rows: list[Compared]) -> list[str]:
@@ -122,9 +122,9 @@ def _beside(report: Report, rows: list[Compared]) -> list[str]:
         if paper.METHOD in row.found:
             found.setdefault(_verdict(report, row), []).append(row)
     words = []
-    for verdict, sentences in ((BETTER, "nearer on"), (WORSE, "further off on"), (SAME, SAME)):
+    for verdict, phrase in ((BETTER, "nearer on"), (WORSE, "further off on"), (SAME, SAME)):
         if some := found.get(verdict):
-            where = f"{sentences} {_list(row.band for row in some)}"
+            where = f"{phrase} {_list(row.band for row in some)}"
             words.append(where + ("" if verdict == SAME else _by(some, " by")))
     if not words:
         return []
@@ -149,13 +149,13 @@ def _claim(report: Report, rows: list[Compared], claim: str, methods: tuple[str,
         return _list(f"{n} ({', '.join(on)})" if several else n for n, on in names.items())
 
     # what lands further off than the paper's method is what the finding says
-    sentences = (
+    phrases = (
         (WORSE, "holds against", ", nearer by"),
         (BETTER, "does not hold against", ", further off by"),
     )
     parts = [
         f"{words} {which(tried[verdict])}{_by(tried[verdict], by)}"
-        for verdict, words, by in sentences
+        for verdict, words, by in phrases
         if verdict in tried
     ]
     parts += [f"is open against {which(tried[SAME])}"] if SAME in tried else []

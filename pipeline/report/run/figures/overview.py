@@ -11,6 +11,7 @@ from pipeline.episode.episode import Episode
 from pipeline.report.drawing.canvas import key, mark, picture
 from pipeline.report.drawing.styles import INK, Style
 from pipeline.report.run.figures.panels import entitle
+from pipeline.report.run.figures.pull import held_samples
 from pipeline.report.run.noise import landed
 from pipeline.report.run.replay import MethodReplay
 
@@ -30,9 +31,7 @@ def overview(
     force = np.linalg.norm(episode.force, axis=1)
     simulated = np.linalg.norm(replay.force, axis=1)
     distance = np.linalg.norm(episode.position[:, 1:], axis=1)
-    held = (episode.time >= episode.grasp_time) & (
-        episode.time <= episode.release_time - 2 * episode.sample_period
-    )
+    held = held_samples(episode)
     color = style.color
     record.plot(episode.time, force, color=INK, lw=1.2)
     record.axvline(episode.release_time, color="0.6", lw=0.8, zorder=0)

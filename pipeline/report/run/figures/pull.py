@@ -31,7 +31,7 @@ def pull(
     entitle(figure, "A good simulation lies on the black curve and leaves little beside it")
     grid = figure.add_gridspec(2 * len(episodes), 2)
     for row, (band, episode) in zip(range(0, 2 * len(episodes), 2), episodes.items(), strict=True):
-        held = _held(episode)
+        held = held_samples(episode)
         top = figure.add_subplot(grid[row : row + 2, 0])
         middle, bottom = (figure.add_subplot(grid[place, 1]) for place in (row, row + 1))
         draw = np.linalg.norm(episode.position[held, 1:], axis=1)
@@ -62,7 +62,7 @@ def pull(
     return figure
 
 
-def _held(episode: Episode) -> np.ndarray:
+def held_samples(episode: Episode) -> np.ndarray:
     """Samples from grasp to release, but for the last, which mix in the release, shape (T,)."""
     last = episode.release_time - 2 * episode.sample_period
     return (episode.time >= episode.grasp_time) & (episode.time <= last)

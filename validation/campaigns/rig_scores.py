@@ -174,7 +174,8 @@ def saved(params: Params, path: Path) -> Path:
 
 
 def summary(results: list[dict]) -> dict:
-    """Of results with nine targets each: signed mean error, misses, coverage, width, as shares."""
+    """Of results at TARGETS, or their own: mean error, misses, coverage, width, as shares."""
+    targets = np.array([one.get("targets", TARGETS) for one in results])
     error, miss, low, high = (
         np.array([one[name] for one in results], float) for name in ("error", "miss", "low", "high")
     )
@@ -187,7 +188,7 @@ def summary(results: list[dict]) -> dict:
         "failed": int(np.isnan(error).sum()),
         "coverage": inside.mean() if confidence.any() else np.nan,
         "launches": int(confidence.sum()),
-        "median_width": np.nanmedian(((high - low) / TARGETS)[confidence])
+        "median_width": np.nanmedian(((high - low) / targets)[confidence])
         if confidence.any()
         else np.nan,
     }

@@ -1,0 +1,305 @@
+"""Why our method is closer: law, search and prior changed one at a time.
+
+    python -m validation.campaigns.attribution --orange FOLDER
+    python -m validation.campaigns.attribution --page      # the table of docs/paper.md
+
+Recordings: of each rig band and of each sealed rubber by the dip and by the paper's pull, and the
+three of `orange` in FOLDER, which this project did not make. Each is recorded once, and identified
+by every variant: by the paper's search with either law, by our density with either law, and by our
+density with other priors or less trust in the recoil. Landings are scored as by
+validation/campaigns/landings.py, with bands as units; of `orange`, whose landings are given, the
+unit is a recording. Results are lines of results.jsonl in --work: a run that was killed goes on.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+
+from pipeline.base import errors
+from pipeline.base.environment import environment
+from pipeline.base.files import write_json, write_text
+from pipeline.episode.episode import Episode
+from pipeline.identify.posterior.likelihood import Tolerances, opening_time
+from pipeline.launching.trials.spread import landing_intervals
+from pipeline.params import Params, load
+from rig.oracle.world import World
+from validation.campaigns import runner
+from validation.campaigns.landings import SETS, together
+from validation.campaigns.rig_scores import (
+    calibrated_clamps,
+    recorded,
+    saved,
+    scored,
+    sling_of,
+    summary,
+)
+from validation.campaigns.runner import OURS, PAPER, ResultLines, plain, result_of
+from validation.campaigns.variants import priors_of, with_variants
+from validation.density import Calibrated, found
+from validation.marked import marks, with_block
+from validation.orange import NAME as ORANGE
+from validation.orange import landings, with_orange
+from validation.projects import DEFAULTS
+from validation.rubbers import with_rubbers
+
+METHODS = {  # and the words of the table
+    PAPER: "the paper's search, neo-Hookean",
+    "search_rubber": "the paper's search, law `rubber`",
+    "density_neo_hookean": "our density, neo-Hookean",
+    OURS: "our density, law `rubber`: the default",
+    "no_softening": "… without softening",
+    "prior_half": "… priors half as wide",
+    "prior_twice": "… priors twice as wide",
+    "prior_loss_up": "… loss factor expected 40 % higher",
+    "prior_loss_down": "… loss factor expected 40 % lower",
+    "first_picture": "… the recoil's first picture alone",
+    "recoil_trusted_half": "… a recoil's picture trusted half as much",
+}
+RECORDINGS = {"bands": 5, "sealed": 1}
+OF_ORANGE = "orange", "orange_2", "orange_3"
+REPORT, PAGE = Path("reports/validation/attribution.json"), Path("docs/paper.md")
+COLUMNS = {  # of the table
+    ("bands", "informative"): "rig bands, dip",
+    ("bands", "paper"): "rig bands, the paper's pull",
+    ("sealed", "informative"): "sealed, dip",
+    ("sealed", "paper"): "sealed, the paper's pull",
+    ("orange", "paper"): "`orange`, the paper's pull",
+}
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recording of a band.
+
+    Attributes:
+        group: Of bands: "bands", "sealed" or "orange".
+        number: Of the recording; of `orange` its file's.
+    """
+
+    group: str
+    band: str
+    pull: str
+    number: int
+
+    @property
+    def params(self) -> Params:
+        if self.group == "orange":
+            return with_variants(with_orange(load(DEFAULTS)))
+        seed = SETS[self.group][0]
+        return with_variants(with_rubbers(load(DEFAULTS), seed, self.number, self.pull))
+
+    def episode(self, work: Path, orange: Path | None) -> Path:
+        """The folder of its episode and clamps, made where they are missing."""
+        folder = work / "episodes" / self.group / self.pull / self.band / str(self.number)
+        if self.group != "orange":
+            recorded(self.params, self.band, folder)
+        elif not (folder / "mounting.json").exists():
+            from pipeline.recording.build import build_episodes  # needs Open3D
+
+            path = Path(orange or ".") / f"{OF_ORANGE[self.number]}.mcap"
+            episode = build_episodes(path, ORANGE, self.params)[0][0]
+            calibrated_clamps(self.params, ORANGE, episode, folder)
+        return folder
+
+
+@dataclass(frozen=True)
+class Job(Recording):
+    """One variant's identification by a recording."""
+
+    method: str
+
+    @property
+    def recording(self) -> Recording:
+        return Recording(self.group, self.band, self.pull, self.number)
+
+
+def recordings(orange: Path | None, pulls=("informative", "paper")) -> list[Recording]:
+    found = [
+        Recording(group, band, pull, number)
+        for group, most in RECORDINGS.items()
+        for number in range(most)
+        for pull in pulls
+        for band in SETS[group][1]
+    ]
+    count = len(OF_ORANGE) if orange else 0
+    return [Recording("orange", ORANGE, "paper", number) for number in range(count)] + found
+
+
+def with_change(params: Params, method: str) -> tuple[Params, str]:
+    """params.yaml and the name of its method that a variant stands for."""
+    if method == "no_softening":
+        ours = params.methods[OURS]
+        fixed = ours.model_copy(update={"fixed": {**ours.fixed, "softening": 0.0}})
+        methods = {**dict(params.methods.items()), method: fixed}
+        return params.model_copy(update={"methods": methods}), method
+    return params, method if method in params.methods else OURS
+
+
+@contextmanager
+def less_trust(method: str) -> Iterator[None]:
+    """Within it a picture of the recoil has twice the deviation of the way gone."""
+    if method != "recoil_trusted_half":
+        yield
+        return
+    usual = Tolerances.of
+
+    def doubled(episode: Episode) -> Tolerances:
+        return replace(usual(episode), way=2 * Tolerances.way)
+
+    with mock.patch.object(Tolerances, "of", doubled):
+        yield
+
+
+def with_first_picture(episode: Episode) -> Episode:
+    """An episode whose camera saw the recoil once."""
+    after = np.flatnonzero(episode.cloud_time > episode.release_time)
+    later = set(after[np.argsort(episode.cloud_time[after])][1:].tolist())
+    nothing = np.empty((0, 3), np.float32)
+    clouds = [nothing if k in later else cloud for k, cloud in enumerate(episode.clouds)]
+    return replace(episode, clouds=clouds)
+
+
+def identified(job: Job, work: Path, orange: Path | None) -> dict:
+    """Scores of a variant by one recording."""
+    folder = job.recording.episode(work, orange)
+    params, method = with_change(job.params, job.method)
+    episode, sling = Episode.load(folder / "episode"), sling_of(params, job.band, method, folder)
+    if job.method == "first_picture":
+        episode = with_first_picture(episode)
+    friction = params.methods[OURS].fixed["dynamic_friction"]
+    sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
+    with priors_of(job.method), less_trust(job.method):
+        outcome, confidence = found(params, method, sling, [episode])
+    if job.group == "orange":
+        scores = against_given(outcome, params, *landings(Path(orange or ".")))
+    else:
+        file = saved(params_of_rig(job), folder / job.method / "params.yaml")
+        with World(job.band, file, workers=1) as world:
+            scores = scored(outcome, params, world, seed=job.number)
+    return {
+        "scores": scores,
+        "identified": outcome.identified,
+        "settled": confidence.get("settled"),
+    }
+
+
+def params_of_rig(job: Job) -> Params:
+    """What the rig's own processes read: without the variants."""
+    return with_rubbers(load(DEFAULTS), SETS[job.group][0], job.number, job.pull)
+
+
+def against_given(
+    outcome: Calibrated, params: Params, draws: np.ndarray, measured: np.ndarray
+) -> dict:
+    """The same scores of given landings [m] of draws (N, 2): errors are from what was predicted."""
+    predicted = outcome(draws).landing_y
+    low = high = np.full(len(draws), np.nan)
+    if outcome.samples is not None:
+        error = params.trials.actuation_error
+        low, high = landing_intervals(outcome, draws, outcome.samples, error).T
+    return {
+        "error": measured / predicted - 1,
+        "miss": measured - predicted,
+        "low": low,
+        "high": high,
+        "inside": (measured >= low) & (measured <= high),
+        "targets": measured,
+    }
+
+
+def performed(job: Job, work: Path, orange: Path | None) -> dict:
+    return result_of(job, partial(identified, job, work, orange))
+
+
+def figures(lines: list[dict]) -> dict:
+    """By group and pull, each method's `together`, and the mean errors of each band."""
+    result: dict = {}
+    for group, pull in COLUMNS:
+        some = [one for one in lines if (one["group"], one["pull"]) == (group, pull)]
+        for method in METHODS:
+            own = [one for one in some if one["method"] == method and "failed" not in one]
+            if not own:
+                continue
+            unit = "number" if group == "orange" else "band"
+            names = dict.fromkeys(one[unit] for one in own)
+            of_units = {
+                str(name): summary([one["scores"] for one in own if one[unit] == name])
+                for name in names
+            }
+            result.setdefault(f"{group}, {pull}", {})[method] = {
+                "together": together(of_units),
+                "recordings": len(own),
+                "failed": sum(one["method"] == method for one in some) - len(own),
+                "mean_bias": {name: about["mean_bias"] for name, about in of_units.items()},
+                "coverage": {name: about["coverage"] for name, about in of_units.items()},
+            }
+    return plain(result, 4)
+
+
+def block(content: dict) -> str:
+    """What the page has between its marks."""
+    begin, end = marks("attribution")
+    there = {", ".join(key): words for key, words in COLUMNS.items()}
+    heads = [f"{words} ({_units(content['figures'][key])})" for key, words in there.items()]
+    rows = ["| identified by | " + " | ".join(heads) + " |", "|---|" + "---:|" * len(heads)]
+    for method, words in METHODS.items():
+        cells = [_cell(content["figures"][key].get(method)) for key in there]
+        rows.append(f"| {words} | " + " | ".join(cells) + " |")
+    return begin + "\n".join(rows) + "\n" + end
+
+
+def _units(of_methods: dict) -> int:
+    return len(of_methods[OURS]["mean_bias"])
+
+
+def _cell(about: dict | None) -> str:
+    if about is None:
+        return "–"
+    one = about["together"]
+    text = f"{100 * one['mean_size_of_bias']:.1f} %"
+    if one["coverage"] is not None:
+        inside, width = (100 * one[name] for name in ("coverage", "median_width"))
+        text += f"; {inside:.0f} % in {width:.0f} %"
+    return text
+
+
+def main() -> int:
+    parser = runner.parser(__doc__, REPORT, Path("data/attribution"), minutes=True)
+    parser.add_argument("--page", action="store_true", help=f"only write into {PAGE}")
+    parser.add_argument("--orange", type=Path, help="the folder of its recordings and landings")
+    arguments = parser.parse_args()
+    if arguments.page:
+        content = json.loads(arguments.report.read_text(encoding="utf-8"))
+        write_text(PAGE, with_block(PAGE.read_text(encoding="utf-8"), block(content)))
+        return 0
+    work, orange = arguments.work.resolve(), arguments.orange and arguments.orange.resolve()
+    results, every = ResultLines(work / "results.jsonl"), recordings(orange)
+    todo = [Job(**asdict(one), method=method) for one in every for method in METHODS]
+    limits = arguments.workers, arguments.minutes
+    for _ in runner.each(partial(Recording.episode, work=work, orange=orange), every, *limits):
+        pass
+    runner.run(partial(performed, work=work, orange=orange), todo, results, *limits)
+    lines = results.among(todo)
+    command = "python -m validation.campaigns.attribution --orange FOLDER"
+    report = environment("cpu", command) | {
+        "kind": "virtual",
+        "jobs": [len(lines), len(todo)],
+        "recordings_of_each_band": RECORDINGS,
+        "pads": "open as fast as the recorded force fell, for every variant",
+        "figures": figures(lines),
+    }
+    write_json(arguments.report, report)
+    print(block(report))
+    return 0
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -63,7 +63,7 @@ METHODS = {  # and the words of the table
     "first_picture": "… the recoil's first picture alone",
     "recoil_trusted_half": "… a recoil's picture trusted half as much",
 }
-RECORDINGS = {"bands": 5, "sealed": 1}
+RECORDINGS = {"bands": 3, "sealed": 1}
 OF_ORANGE = "orange", "orange_2", "orange_3"
 REPORT, PAGE = Path("reports/validation/attribution.json"), Path("docs/paper.md")
 COLUMNS = {  # of the table

@@ -174,7 +174,7 @@ def _vectors(name: str, values: np.ndarray, count: int) -> np.ndarray:
 
 
 def _clouds(clouds: Sequence[np.ndarray]) -> list[np.ndarray]:
-    found = [np.asarray(one, np.float32).reshape(-1, 3) for one in clouds]
+    found = [np.asarray(cloud, np.float32).reshape(-1, 3) for cloud in clouds]
     if not any(map(len, found)):
         raise UserError("clouds: no frame has a point")
     if not all(np.isfinite(one).all() for one in found):

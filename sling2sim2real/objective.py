@@ -71,7 +71,9 @@ class Objective:
         self._box, self.names = box, box.free
         self.low, self.high = (ends[box.axes] for ends in (box.low, box.high))
         self._model, self._own, self._episodes = model, loss, list(episodes)
-        self._evaluators = [] if loss else [self._evaluator(one, method) for one in episodes]
+        self._evaluators = (
+            [] if loss else [self._evaluator(episode, method) for episode in episodes]
+        )
 
     def _evaluator(self, episode: Episode, method: str) -> Evaluator:
         law = self._model.settings.methods[method].law

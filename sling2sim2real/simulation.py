@@ -84,9 +84,9 @@ def simulate_batch(model: Model, episode: Episode, thetas: Sequence[Theta]) -> l
     Raises:
         UserError: They are not of one law, or the episode has no pull.
     """
-    if not thetas or {one.law for one in thetas} != {model.theta.law}:
+    if not thetas or {theta.law for theta in thetas} != {model.theta.law}:
         raise UserError(f"thetas: give some, all of the model's law, {model.theta.law}")
-    parameters = Parameters(model.theta.law, np.stack([one.point for one in thetas]))
+    parameters = Parameters(model.theta.law, np.stack([theta.point for theta in thetas]))
 
     def part(some: Parameters) -> list[Simulation]:
         done = replay(model.sling, episode, some, model.settings.force)

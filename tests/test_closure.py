@@ -78,7 +78,7 @@ def test_what_a_run_may_leave_empty_is_in_git() -> None:
             if ungrouped(name) == name
             and any(str(out).startswith(f"{dep}/") for out in stage["outs"])
         ]
-        lists = {str(one.get("method", one["band"])) for one in writers}
+        lists = {str(writer.get("method", writer["band"])) for writer in writers}
         steps = {one.partition("run.steps.")[2].rstrip("}") for one in lists}
         if steps != ends and ("" not in steps or lists == {"${run.rig}"}):
             assert (ROOT / dep / ".gitkeep").is_file(), dep

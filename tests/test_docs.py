@@ -218,7 +218,9 @@ def is_file(name: str) -> bool:
 
 def test_every_option_is_one() -> None:
     """Commands inside sentences: `sling check --sheet`; placeholders may follow."""
-    subs = next(one for one in parser()._actions if one.choices and "check" in one.choices).choices
+    subs = next(
+        action for action in parser()._actions if action.choices and "check" in action.choices
+    ).choices
     found = 0
     for page in written():
         for span in SPAN.findall(page.read_text(encoding="utf-8")):
@@ -243,9 +245,11 @@ def test_python_imports_what_there_is() -> None:
 
 def imported(node: ast.AST) -> list[tuple[str, str]]:
     if isinstance(node, ast.Import):
-        return [(one.name, "") for one in node.names]
+        return [(name.name, "") for name in node.names]
     return (
-        [(node.module, one.name) for one in node.names] if isinstance(node, ast.ImportFrom) else []
+        [(node.module, name.name) for name in node.names]
+        if isinstance(node, ast.ImportFrom)
+        else []
     )
 
 

@@ -92,7 +92,7 @@ def imported(file: Path) -> Iterator[str]:
     """Packages of others that a file imports, wherever in it, and asks pytest for."""
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
-            names = [one.name for one in node.names]
+            names = [name.name for name in node.names]
         elif isinstance(node, ast.ImportFrom) and not node.level:
             names = [node.module]
         elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "importorskip":

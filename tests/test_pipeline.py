@@ -72,8 +72,8 @@ class Copy(ProjectCopy):
         found = {}
         for stage, changes in json.loads(self("dvc", "status", "--json")).items():
             deps = [change["changed deps"] for change in changes]
-            keys = [key for one in deps for key in one.pop("params.yaml", ())]
-            found[stage] = [*keys, *(path for one in deps for path in one)]
+            keys = [key for dep in deps for key in dep.pop("params.yaml", ())]
+            found[stage] = [*keys, *(path for dep in deps for path in dep)]
         return found
 
     @cached_property

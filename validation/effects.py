@@ -45,7 +45,7 @@ def _effect(by: dict, method: str, switch: str, bands: list[str]) -> dict | None
     failed = sum("failed" in one for one in with_)
 
     def values(results: list[dict], name: str) -> np.ndarray:
-        return np.array([one.get(name) for one in results], float)  # None is NaN
+        return np.array([result.get(name) for result in results], float)  # None is NaN
 
     found = {"runs": len(keys), "failed": failed}
     for name in ("youngs_modulus", "peak_force", "force_rms_n", "loss", "miss"):
@@ -117,7 +117,7 @@ def runs(figures: dict, rows: dict[str, str], methods: dict[str, str]) -> list[s
 
 def _typeset(*cells: str) -> tuple[str, ...]:
     """With a minus, and nothing where there is no number."""
-    return tuple("–" if "nan" in one else one.replace("-", "−") for one in cells)
+    return tuple("–" if "nan" in cell else cell.replace("-", "−") for cell in cells)
 
 
 def _of(figures: dict, name: str, end: str = "mean") -> float:

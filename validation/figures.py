@@ -88,20 +88,22 @@ def shown(figures: list[CommittedFigures]) -> str:
     """A table, and how many are of which code."""
     words = {True: "met", False: "not met", None: "-"}
     rows = [("file", "code", "state", "")]
-    rows += [(one.file, one.digest or "-", one.state, words[one.met]) for one in figures]
+    rows += [
+        (figure.file, figure.digest or "-", figure.state, words[figure.met]) for figure in figures
+    ]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
         "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
         for row in rows
     ]
-    counts = [sum(one.state == state for one in figures) for state in (TODAY, OLDER)]
+    counts = [sum(figure.state == state for figure in figures) for state in (TODAY, OLDER)]
     known = f"{counts[0]} of {len(figures)} are of today's code, {counts[1]} of older code"
-    unmet = sum(one.met is False for one in figures)
+    unmet = sum(figure.met is False for figure in figures)
     return "\n".join([*lines, "", f"{known}; {unmet} do not meet what they ask"])
 
 
 def as_json(figures: list[CommittedFigures]) -> str:
-    return json.dumps({"figures": [asdict(one) for one in figures]})
+    return json.dumps({"figures": [asdict(figure) for figure in figures]})
 
 
 def _figures(file: Path, root: Path, code: Path, state: str | None) -> CommittedFigures:
@@ -136,7 +138,7 @@ def _met(content: dict) -> bool | None:
     if isinstance(content.get("met"), bool):
         return content["met"]
     checks = [one for part in content.get("sections", []) for one in part.get("checks", [])]
-    limited = [one["met"] for one in checks if one.get("met") is not None]
+    limited = [check["met"] for check in checks if check.get("met") is not None]
     return all(limited) if limited else None
 
 

@@ -78,7 +78,7 @@ def _rubber(kind: str, law: str, rng: np.random.Generator) -> tuple[dict, dict]:
         "viscosity": between(0.0005, 0.0025, log=True),
         "color": [float(f"{one:.2f}") for one in hsv_to_rgb(rng.random(), 0.8, 0.85)],
         "law": law,
-        "constants": [near(one, share) for one in constants],
+        "constants": [near(constant, share) for constant in constants],
         "spectrum": None,
         "flow": None,
         "softening": None,

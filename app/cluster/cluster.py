@@ -102,7 +102,7 @@ class Cluster:
             exchange.expect_remote(root)
             self._send(stage.producers, cancelled)
         resources: dict[str, float] = {}
-        if stage.gpu and any(one["resources"].get(GPU) for one in workers.values()):
+        if stage.gpu and any(worker["resources"].get(GPU) for worker in workers.values()):
             resources = {GPU: 1}
         elif stage.gpu:
             on_line(f"no worker offers {GPU} (dask worker --resources {GPU}=1): runs on any")
@@ -177,7 +177,7 @@ class Cluster:
     def _send(self, producers: tuple[str, ...], cancelled: Callable[[], bool]) -> None:
         """Push what the remote may lack of what these stages made. Raises as `transfer`."""
         with self._lock:
-            new = tuple(one for one in producers if one not in self._sent)
+            new = tuple(producer for producer in producers if producer not in self._sent)
             exchange.transfer(self.root, "push", new, cancelled)
             self._sent.update(new)
 
@@ -282,7 +282,7 @@ def waits(workers: Mapping[str, dict], on: str, resources: Mapping[str, float]) 
         return ""
     if on:
         return f"worker {on} is gone: the stage begins anew on another"
-    fit = [one for one in workers.values() if not resources or one["resources"].get(GPU)]
+    fit = [worker for worker in workers.values() if not resources or worker["resources"].get(GPU)]
     return f"waits for a {'free ' if fit else ''}worker{f' with {GPU}' if resources else ''}"
 
 

@@ -50,7 +50,11 @@ def introduce(token: str) -> tuple[bool, dict[str, str]]:
 
 def versions() -> dict[str, str]:
     """Of Python and of every package that is installed, by name in lower case."""
-    found = {one.name.lower(): one.version for one in distributions() if one.name}
+    found = {
+        distribution.name.lower(): distribution.version
+        for distribution in distributions()
+        if distribution.name
+    }
     return {"python": platform.python_version(), **found}
 
 

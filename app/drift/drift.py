@@ -67,8 +67,8 @@ def drift(settings: Settings, band: str, root: Path | str = ".") -> dict:
         raise UserError(f"{band}: fewer than two of the recordings could be fitted")
     values = {name: [found[i].values[name] for i in settled] for name in COMPARED}
     changed = [
-        replace(one, earlier=settled[one.earlier], later=settled[one.later])
-        for one in changes(values)
+        replace(change, earlier=settled[change.earlier], later=settled[change.later])
+        for change in changes(values)
     ]
     deeper = _stretched_further(own, settings, found)
     new = max([newest(changed), *deeper])

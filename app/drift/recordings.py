@@ -73,7 +73,9 @@ def identified(
         UserError: A recording cannot be used.
     """
     try:
-        known = {one.key: one for one in read_json(retained, KeptRecordings).recordings}
+        known = {
+            recording.key: recording for recording in read_json(retained, KeptRecordings).recordings
+        }
     except NotMade:
         known = {}
     about = json.dumps([vars(band), settings.model_dump(mode="json", include=set(USED)), code])
@@ -89,7 +91,7 @@ def identified(
 
 def _alone(file: Path, key: str, band: Band, settings: Settings) -> IdentifiedRecording:
     episodes = read_mcap(file, band, settings=settings)
-    begins = [one.metadata["input"]["start_ns"] for one in episodes]
+    begins = [episode.metadata["input"]["start_ns"] for episode in episodes]
     found = identify(episodes, band, settings=settings)
     return IdentifiedRecording(
         file=file.name,

@@ -95,7 +95,7 @@ def fit(
         countdown.line,
         countdown.begins,
         command="sling fit",
-        producers={one.name: one.producers for one in stages},
+        producers={stage.name: stage.producers for stage in stages},
     )
     countdown.ends()
     card = layout.card(name)

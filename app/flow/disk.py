@@ -65,7 +65,7 @@ def _without_git(root: Path) -> None:
 
     folders = (root.resolve(), *root.resolve().parents)
     dvc = root / ".dvc"
-    if any((one / ".git").exists() for one in folders) or not dvc.is_dir():
+    if any((folder / ".git").exists() for folder in folders) or not dvc.is_dir():
         return
     config = Config(str(dvc))
     if not config["core"].get("no_scm"):

@@ -80,8 +80,8 @@ class Graph:
             repo = Repo(str(root))
             with repo.lock:  # dvc.lock is rewritten in place
                 self.stages = _stages(repo.index)
-            stages = [one for one in repo.index.stages if isinstance(one, PipelineStage)]
-            self._dvc = {one.name: one for one in stages if one.cmd}
+            stages = [stage for stage in repo.index.stages if isinstance(stage, PipelineStage)]
+            self._dvc = {stage.name: stage for stage in stages if stage.cmd}
 
     def stale(self) -> list[str]:
         """Stages that DVC would run as things are, and all their consumers, in order."""
@@ -190,9 +190,11 @@ def _stages(index) -> dict[str, Stage]:
     import networkx
 
     graph = index.graph  # from consumers to producers; makes of `dvc add` are nodes too
-    known, height = [one for one in index.stages if one.cmd], {}
+    known, height = [stage for stage in index.stages if stage.cmd], {}
     for node in networkx.topological_sort(graph):
-        height[node] = 1 + max((height[one] for one in graph.predecessors(node)), default=0)
+        height[node] = 1 + max(
+            (height[predecessor] for predecessor in graph.predecessors(node)), default=0
+        )
     known.sort(key=lambda one: -height[one])
     return {one.name: _stage(one, [to for to in graph.successors(one) if to.cmd]) for one in known}
 
@@ -202,7 +204,7 @@ def _stage(stage, producers: list) -> Stage:
     from dvc.dependency import ParamsDependency
 
     step, _, item = stage.name.partition("@")
-    made = [Path(out.fs_path) for one in producers for out in one.outs]
+    made = [Path(out.fs_path) for producer in producers for out in producer.outs]
     read = (Path(dep.fs_path) for dep in stage.deps if not isinstance(dep, ParamsDependency))
     sources = (
         os.path.relpath(path, stage.repo.root_dir)
@@ -213,7 +215,7 @@ def _stage(stage, producers: list) -> Stage:
         stage.name,
         step,
         item,
-        producers=tuple(sorted(one.name for one in producers)),
+        producers=tuple(sorted(producer.name for producer in producers)),
         gpu=bool((stage.meta or {}).get("gpu")),
         sources=tuple(sorted(sources)),
         travels=all(out.use_cache for out in stage.outs),

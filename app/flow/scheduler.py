@@ -78,6 +78,8 @@ def width(stages: list[Stage]) -> int:
     """How many stages can run at once: the most that lie as far from the beginning."""
     depth: dict[str, int] = {}
     for stage in stages:
-        depth[stage.name] = 1 + max((depth.get(one, 0) for one in stage.producers), default=0)
+        depth[stage.name] = 1 + max(
+            (depth.get(producer, 0) for producer in stage.producers), default=0
+        )
     levels = list(depth.values())
     return max(map(levels.count, levels))

@@ -138,7 +138,7 @@ def _look_at_pull(report: CheckReport, done: Checked) -> Look:
     try:
         report.signals = SignalSummary.of(done)
         phases = phases_of_hand(done.signals)
-        report.motion = [MotionPhase.of(one, done.start) for one in phases]
+        report.motion = [MotionPhase.of(phase, done.start) for phase in phases]
         report.keeps_prior = unseen(phases)
         if refusal and refusal.about == UNDERSTOOD.name:
             return Look(report, recording)

@@ -89,7 +89,7 @@ def checked(
         if not look.report.usable:
             raise UserError(f"{file}: {look.report.problem}")
         if all(pull.usable for pull in look.report.pulls):
-            made[file] = [episode_of(one, band, params) for one in look.pulls]
+            made[file] = [episode_of(pull, band, params) for pull in look.pulls]
     for file, episodes in made.items():
         stored.keep(file, episodes, params, layout)
     return reports

@@ -84,8 +84,8 @@ def legs_of(plan: Path) -> tuple[list[Leg], Leg]:
 def openings(plan: Path) -> list[tuple[float, float]]:
     """When the fingers are commanded [s], and to which distance [m], by gripper.json."""
     found = []
-    for one in json.loads((plan / "gripper.json").read_text()):
-        at, gap = one["time_from_start"], 2 * one["command"]["position"]
+    for load in json.loads((plan / "gripper.json").read_text()):
+        at, gap = load["time_from_start"], 2 * load["command"]["position"]
         if not 0 <= gap <= WIDEST + 1e-9:
             raise ValueError(
                 f"{plan}: a Franka's hand opens from 0 to {WIDEST} m, not to {gap:g}: plan with"

@@ -189,8 +189,8 @@ def _flowing(time: float, strain: np.ndarray, rate: np.ndarray, data: tuple) -> 
     coefficients, step, material = data
     leg = min(int(time / step), coefficients.shape[1] - 1)
     since, stretch = time - leg * step, 0.0
-    for one in coefficients[:, leg]:
-        stretch = stretch * since + one
+    for coefficient in coefficients[:, leg]:
+        stretch = stretch * since + coefficient
     elastic = stretch / np.exp(strain[0])
     stress = elasticity.at(material.law, elastic, material.constants)[1]
     rate[0] = flow_speed(stress * elastic / material.modulus, strain[0], material.flow)

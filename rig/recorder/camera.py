@@ -137,9 +137,9 @@ def blurred(instants: list[Exposure]) -> Exposure:
     """Pictures of equally long parts of one exposure as one."""
     if len(instants) == 1:
         return instants[0]
-    depths = np.stack([one.depth for one in instants])
+    depths = np.stack([instant.depth for instant in instants])
     return Exposure(
-        np.mean([one.color for one in instants], axis=0),
+        np.mean([instant.color for instant in instants], axis=0),
         np.sort(depths, axis=0)[len(depths) // 2],
         depths.min(axis=0),
         depths.max(axis=0),

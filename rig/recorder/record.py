@@ -98,7 +98,7 @@ def record(
             camera.see(joined([tube(line, radius(string, line), color), others]))
             for line in instants_of(lines, camera)
         ]
-        picture = eye.blurred([eye.nearer(still, one) for one in instants])
+        picture = eye.blurred([eye.nearer(still, instant) for instant in instants])
         add_picture(bag, clock, camera, time, picture, params, camera_rng)
     with replacing(path) as temporary:
         bag.write(temporary)

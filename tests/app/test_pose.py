@@ -123,7 +123,7 @@ def test_the_recorded_draw_is_the_pose_that_the_robot_reported(recorded) -> None
     path = root / RECORDING
     with path.open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        poses = [one[3] for one in reader.iter_decoded_messages(["/arm/current_pose"])]
+        poses = [message[3] for message in reader.iter_decoded_messages(["/arm/current_pose"])]
     start = poses[0].header.stamp.sec + poses[0].header.stamp.nanosec * 1e-9
     reported = next(
         one

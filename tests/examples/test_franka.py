@@ -107,7 +107,7 @@ def test_the_fake_is_told_the_plan(execute, planned, monkeypatch) -> None:
         np.testing.assert_allclose(place, row["base"], atol=2e-4)  # of a sample after it
         np.testing.assert_allclose(turn, plan.hand, atol=1e-6)
     fingers = [one for one in fake.summary if one[0] in ("open", "grasp")]
-    assert [one[:2] for one in fingers] == [
+    assert [finger[:2] for finger in fingers] == [
         ("open", 0.08),  # before it begins
         ("grasp", 0.0),
         ("open", 0.08),

@@ -43,7 +43,9 @@ def test_usd_and_the_schemas_of_physx_know_all_that_is_in_it(done) -> None:
     assert [one.GetMessage() for one in found] == []
     for prim in stage.Traverse():
         known = set(prim.GetPrimDefinition().GetPropertyNames())
-        unknown = {one.GetName() for one in prim.GetAuthoredProperties()} - known
+        unknown = {
+            GetAuthoredProperty.GetName() for GetAuthoredProperty in prim.GetAuthoredProperties()
+        } - known
         assert {one for one in unknown if not one.startswith(("xformOp", "material:"))} == set()
     band = UsdGeom.TetMesh(stage.GetPrimAtPath("/World/Band"))
     points, tets = (

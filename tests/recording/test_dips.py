@@ -61,7 +61,9 @@ def done(request, params, tmp_path_factory):
 
 
 def test_no_check_takes_a_dip_for_a_fault(done) -> None:
-    found = [one for one in done[2].findings if "it swings" not in one.what]  # as it is made
+    found = [
+        finding for finding in done[2].findings if "it swings" not in finding.what
+    ]  # as it is made
     assert {one.about for one in found} <= ASIDE
 
 
@@ -85,7 +87,7 @@ def test_the_window_follows_the_interaction(done, params) -> None:
         assert usual.samples < len(signals.time) <= (needed + 0.5) / period + 2
     assert len(pull.view.times) == pytest.approx(15 * signals.duration, abs=2)
     episode = episode_of(pull, "band1", params)
-    assert [one.kind for one in phases(episode)] == EXPECTED[name].split()
+    assert [phase.kind for phase in phases(episode)] == EXPECTED[name].split()
     hand = np.array([truth.hand(pull.start + time) for time in episode.time])
     np.testing.assert_allclose(episode.position, hand, atol=1e-3)
 

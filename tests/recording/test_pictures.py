@@ -52,7 +52,7 @@ def test_what_can_be_decoded_is_read_and_the_rest_is_counted_as_colour(tmp_path)
     padded = looked_at(tmp_path, of_color(lambda k, data: data + bytes(3000)))
     assert padded.clouds.damaged == padded.clouds.damaged_colors == 0
     some = looked_at(tmp_path, of_color(lambda k, data: data[: len(data) // (1 + (k % 4 == 0))]))
-    output = [one.what for one in pictures.findings(some) if one.about == "damaged"]
+    output = [finding.what for finding in pictures.findings(some) if finding.about == "damaged"]
     assert output == [f"{some.clouds.damaged_colors} colour pictures cannot be decoded"]
     assert len(some.clouds.points) + some.clouds.damaged == len(padded.clouds.points)
 
@@ -98,8 +98,8 @@ def test_depth_of_another_unit_or_order(
     def driver(*arguments) -> Recording:
         recording = read(*arguments)
         values = [
-            written(np.round(1000 * depth(one)), factor, kind, swapped)
-            for one in recording.depth.values
+            written(np.round(1000 * depth(value)), factor, kind, swapped)
+            for value in recording.depth.values
         ]
         return replace(recording, depth=replace(recording.depth, values=values))
 

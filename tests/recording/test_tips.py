@@ -164,9 +164,9 @@ def misplaced(shift: np.ndarray, turn: np.ndarray):
     wrong = Rotation.from_rotvec(turn)
 
     def move(stamp: int, message) -> None:
-        for one in message.transforms:
-            if one.child_frame_id == "optical":
-                p, q = one.transform.translation, one.transform.rotation
+        for transform in message.transforms:
+            if transform.child_frame_id == "optical":
+                p, q = transform.transform.translation, transform.transform.rotation
                 place = wrong.apply(BASE[0].apply([p.x, p.y, p.z]) + BASE[1]) + shift
                 p.x, p.y, p.z = map(float, BASE[0].inv().apply(place - BASE[1]))
                 turned = wrong * BASE[0] * Rotation.from_quat([q.x, q.y, q.z, q.w])
@@ -184,8 +184,8 @@ def test_a_misplaced_tf_static_is_measured(checked, params, tmp_path) -> None:
     found = done.tips.offsets
     np.testing.assert_allclose(found - checked.tips.offsets, truth, atol=0.0007)
     assert np.all(np.abs(found - truth) < 3 * done.tips.errors)
-    assert [one for one in done.cautions if one.about == "extrinsics"]
-    assert not [one for one in checked.cautions if one.about == "extrinsics"]
+    assert [caution for caution in done.cautions if caution.about == "extrinsics"]
+    assert not [caution for caution in checked.cautions if caution.about == "extrinsics"]
 
     # What is proposed for params.yaml brings the clouds back.
     pose = tuple(camera_to_fork(done.tips, done.pull.geometry))

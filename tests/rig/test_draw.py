@@ -30,7 +30,7 @@ def test_each_recording_has_its_own_within_the_ranges(params: Params) -> None:
             continue
         values = [value_of(world, key) for world in worlds]
         assert len({*values}) == 3, key
-        assert all(low <= one <= high for one in values), key
+        assert all(low <= value <= high for value in values), key
     again = drawn(params, "band1")
     assert all(value_of(again, key) == value_of(worlds[0], key) for key in params.rig.draws)
 

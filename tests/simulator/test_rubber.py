@@ -55,7 +55,8 @@ def test_each_parameter_has_its_effect(rubber, launch_setup):
     memory = gum(relaxation=0.04)
     histories = LaunchHistory(1.0, 0.1), LaunchHistory(1.0, 10.0), LaunchHistory(1.0, 600.0)
     fresh, later, old = (
-        launch(rubber, replace(launch_setup, history=one), memory, DRAW) for one in histories
+        launch(rubber, replace(launch_setup, history=history), memory, DRAW)
+        for history in histories
     )
     assert fresh.hold_force > 1.03 * plain.hold_force > 1.06 * old.hold_force
     assert later.hold_force == pytest.approx(plain.hold_force, rel=0.01)  # E is after ten seconds

@@ -12,7 +12,7 @@ import sling2sim2real
 from pipeline.episode.episode import Episode
 from tests.project import ROOT
 
-MODULES = [one.name for one in pkgutil.iter_modules(sling2sim2real.__path__)]
+MODULES = [module.name for module in pkgutil.iter_modules(sling2sim2real.__path__)]
 RESULTS = {
     "Aim",
     "Episode",
@@ -47,7 +47,11 @@ def test_functions_say_what_they_take_and_raise() -> None:
         if inspect.isfunction(thing):
             message = thing.__doc__
             assert "Args:" in message and "Raises:" in message, name
-            lacking = [one for one in inspect.signature(thing).parameters if one not in message]
+            lacking = [
+                parameter
+                for parameter in inspect.signature(thing).parameters
+                if parameter not in message
+            ]
             assert not lacking, f"{name}: {lacking}"
 
 
@@ -62,8 +66,8 @@ def test_the_page_of_it_and_the_notebook_run(tmp_path, monkeypatch, capsys) -> N
     assert not any(one["outputs"] for one in cells)
     monkeypatch.chdir(tmp_path)
     names: dict = {}
-    for one in cells:
-        exec("".join(one["source"]), names)
+    for cell in cells:
+        exec("".join(cell["source"]), names)
     stiffness, aimed = capsys.readouterr().out.splitlines()
     assert float(stiffness.split()[0]) == pytest.approx(2.2e5, rel=0.1)
     assert "has not converged" not in aimed and (tmp_path / "my_band.json").exists()

@@ -83,7 +83,7 @@ def test_a_runs_policy_is_asked_as_the_command_asks_it(world, tmp_path) -> None:
     about = {name: getattr(world, name) for name in ("band", "theta", "settings")}
     found = aim(Identification(**about, policy=policy), 2.0)
     np.testing.assert_allclose(found.draw, policy.draws(np.array([2.0]))[0])
-    assert not any("another θ" in one for one in found.warnings)
+    assert not any("another θ" in warning for warning in found.warnings)
     put_card(policy.folder, {"youngs_modulus": 1.0})
     summary = aim(Identification(**about, policy=policy), 2.0).warnings
     assert any("another θ" in one for one in summary)

@@ -152,5 +152,5 @@ def test_the_command_lists_each_committed_file() -> None:
     requested = ["git", "ls-files", "reports/*.json"]
     names = subprocess.run(requested, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     done = python("-m", "app", "figures", "--json", folder=ROOT)
-    summary = {one["file"] for one in json.loads(done.stdout)["figures"]}
+    summary = {load["file"] for load in json.loads(done.stdout)["figures"]}
     assert {*names.split()} <= summary and len(summary) > 20

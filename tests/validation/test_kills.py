@@ -225,8 +225,10 @@ def test_the_docs_say_what_was_counted() -> None:
         f"{counts['kills']} kills at random moments over `dvc repro`, `sling flow`, `sling fit`"
     )
     assert message in page and f"and {counts['full_disks']} disks that became full" in page
-    assert all(one[check] for one in counts["rounds"] for check in CAME_OUT)
-    assert all("Prefect's server does not start" in one["fault"] for one in counts["faults"])
-    left = [one for one in counts["rounds"] if not (one["no_temporaries"] and one["no_locks"])]
+    assert all(count[check] for count in counts["rounds"] for check in CAME_OUT)
+    assert all("Prefect's server does not start" in count["fault"] for count in counts["faults"])
+    left = [
+        count for count in counts["rounds"] if not (count["no_temporaries"] and count["no_locks"])
+    ]
     assert found["met"] is not bool(left or counts["faults"])
     assert ("Two things were amiss there" in page) is not found["met"]

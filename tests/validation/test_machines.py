@@ -184,7 +184,7 @@ def test_equal_runs_and_one_that_has_more(runs, capsys) -> None:
     assert (content["met"], content["outputs"], content["differing"]) == (True, 2, [])
     landings = content["landings_cm"]
     assert {"band1 least_squares", "band3 sling2sim2real"} <= landings.keys()
-    assert all(one["these_runs"] == one["committed"] for one in landings.values())
+    assert all(landing["these_runs"] == landing["committed"] for landing in landings.values())
 
 
 def test_what_differs_or_lacks_is_named(runs, capsys) -> None:

@@ -27,9 +27,11 @@ def test_the_first_mutations_of_each_family(tmp_path) -> None:
     """Of those of the campaign."""
     results = []
     mutations.run(tmp_path, [(*cell, 0, EACH) for cell in CELLS], 1, results.append)
-    assert len({mutations.key(one) for one in results}) == len(results) == EACH * len(CELLS)
+    assert len({mutations.key(result) for result in results}) == len(results) == EACH * len(CELLS)
     assert mutations.faults(results) == []
-    assert {*SORTS} <= {one["outcome"] for one in results}  # the damage was not all of one sort
+    assert {*SORTS} <= {
+        result["outcome"] for result in results
+    }  # the damage was not all of one sort
     on_result = mutations.summary(results, len(results))
     assert on_result["met"] and on_result["figures"]["recordings"] == len(results)
     assert not mutations.summary(results, len(results) + 1)["met"]

@@ -58,7 +58,7 @@ def full(folder: Path, device: str) -> dict:
     torch.manual_seed(0)
     model = Sam3VideoModel(Sam3VideoConfig())
     about = {
-        "parameters": sum(one.numel() for one in model.parameters()),
+        "parameters": sum(parameter.numel() for parameter in model.parameters()),
         "image": model.config.image_size,
     }
     model.to(torch.bfloat16).save_pretrained(folder)

@@ -95,7 +95,7 @@ def scaling(
             strict=True,
         )
         numbers = [_searched(history) for history in histories]
-        equal = [all(map(_same, one, numbers[0])) for one in numbers]
+        equal = [all(map(_same, number, numbers[0])) for number in numbers]
         return {"method": method, "budget": size, "one_device": rows[0]} | _row(
             teams, [row["seconds"] for row in rows], equal
         )

@@ -141,10 +141,10 @@ def seconds_of_fit(folder: Path) -> dict[str, int]:
         if events[0]["command"] != "sling fit":
             continue
         begun = {one["stage"]: one["at"] for one in events if one["what"] == "stage"}
-        for one in events:
-            if one["what"] == "ended" and one.get("stage") in begun:
-                step = GROUP.sub("", one["stage"].partition("@")[0])
-                found[step] = max(round(one["at"] - begun[one["stage"]]), 1)
+        for event in events:
+            if event["what"] == "ended" and event.get("stage") in begun:
+                step = GROUP.sub("", event["stage"].partition("@")[0])
+                found[step] = max(round(event["at"] - begun[event["stage"]]), 1)
     return found
 
 
@@ -253,7 +253,7 @@ def times(
         " recording that was not made here.",
         "commit": json.loads((folder / "clone.json").read_text(encoding="utf-8"))["commit"],
         "simulator": fingerprint(clone / "pipeline/simulator")[:12],
-        "code": digests(*(one for one in scripts if one.is_file()), root=clone),
+        "code": digests(*(script for script in scripts if script.is_file()), root=clone),
         "steps": done,
         "order": [step.name for step in todo],
         "met": all(one["ok"] or "skipped" in one for one in done.values()),

@@ -129,7 +129,7 @@ def scores(results: list[dict], name: str) -> np.ndarray:
         "loss": lambda one: (one["loss"] or {}).get("total", np.nan),
         "youngs_modulus": lambda one: one["theta"]["youngs_modulus"],
     }[name]
-    return np.array([np.nan if lost(one) else values(one) for one in results])
+    return np.array([np.nan if lost(result) else values(result) for result in results])
 
 
 def lost(one: dict) -> bool:
@@ -182,9 +182,9 @@ def rank_correlations(results: list[dict], methods: Sequence[str]) -> np.ndarray
     Positive: the lower the loss that a search reached, the nearer its launches land.
     """
     found = {}
-    for one in results:
-        if one["method"] in methods and one["seed"] == 1 and not lost(one):
-            found.setdefault((one["band"], one["recording"]), []).append(one)
+    for result in results:
+        if result["method"] in methods and result["seed"] == 1 and not lost(result):
+            found.setdefault((result["band"], result["recording"]), []).append(result)
     several = [some for some in found.values() if len(some) > 2]
     pairs = [(scores(some, "loss"), scores(some, "miss_cm")) for some in several]
     return np.array([spearmanr(*pair).statistic for pair in pairs])
@@ -225,10 +225,10 @@ def report(args: argparse.Namespace, params: Params) -> None:
         "settings": {
             "targets_m": params.trials.targets,
             "recordings": {
-                band: sorted({one["recording"] for one in results if one["band"] == band})
+                band: sorted({result["recording"] for result in results if result["band"] == band})
                 for band in args.bands
             },
-            "search_seeds_on_the_first": sorted({one["seed"] for one in results}),
+            "search_seeds_on_the_first": sorted({result["seed"] for result in results}),
             "preset": args.preset,
             "pads": "open as fast as the recorded force fell; of nominal_pads in the lab's time",
             "optimizer": of_job(params, PAPER, args.preset).optimizer.model_dump(),
@@ -243,7 +243,7 @@ def report(args: argparse.Namespace, params: Params) -> None:
         },
         "jobs": len(wanted),
         "done": len(results),
-        "processors": dict(Counter(one.get("processor", "unknown") for one in results)),
+        "processors": dict(Counter(result.get("processor", "unknown") for result in results)),
         "rank_correlation_of_loss_and_miss": {
             "methods": same,
             "over_recordings": mean_interval(rank_correlations(results, same)),

@@ -223,7 +223,7 @@ def figures(lines: list[dict]) -> dict:
     """By group and pull, each method's `together`, and the mean errors of each band."""
     result: dict = {}
     for group, pull in COLUMNS:
-        some = [one for one in lines if (one["group"], one["pull"]) == (group, pull)]
+        some = [line for line in lines if (line["group"], line["pull"]) == (group, pull)]
         for method in METHODS:
             own = [one for one in some if one["method"] == method and "failed" not in one]
             if not own:

@@ -94,7 +94,7 @@ def performed(job: Recorded, work: Path) -> dict:
 
 def figures(lines: list[dict]) -> dict:
     """By what the camera's clock is held against: errors [s], and how true those stated are."""
-    good, result = [one for one in lines if "failed" not in one], {}
+    good, result = [line for line in lines if "failed" not in line], {}
     for name in ("pose", "release", "force"):
         off, stated_errors = (
             np.array([one[part][name] for one in good]) for part in ("off", "stated")

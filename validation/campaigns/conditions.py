@@ -313,11 +313,11 @@ def changes(copy: Path) -> str:
 
 def report(results: list[Result]) -> dict:
     """What the JSON holds, but for what it belongs to."""
-    faults = [one for one in results if one["faults"]]
+    faults = [result for result in results if result["faults"]]
     return {
         "cells": len(results),
-        "conditions": dict(Counter(str(one["condition"]) for one in results)),
-        "refused": sum(one["status"] != 0 for one in results),
+        "conditions": dict(Counter(str(result["condition"]) for result in results)),
+        "refused": sum(result["status"] != 0 for result in results),
         "met": not faults,
         "results": results,
     }
@@ -337,8 +337,8 @@ def main() -> int:
         print(f"left out, for only root can do so: {', '.join(left)}; no report is written")
     conditions = [one for one in conditions if one not in left]
     cells = [Cell(condition, command) for condition in conditions for command in COMMANDS]
-    cells = [one for one in cells if one not in NOT_OURS]
-    cells = [one for one in cells if given.only in f"{one.condition}: {one.command}"]
+    cells = [cell for cell in cells if cell not in NOT_OURS]
+    cells = [cell for cell in cells if given.only in f"{cell.condition}: {cell.command}"]
     there = lines.of(Cell)
 
     def one(cell: Cell) -> None:

@@ -41,7 +41,7 @@ def records(content: bytes) -> list[tuple[int, int, int]]:
 
 
 def _record(content: bytes, random: np.random.Generator, least: int = 1, most: int = 255):
-    found = [one for one in records(content) if least <= one[0] <= most]
+    found = [record for record in records(content) if least <= record[0] <= most]
     return found[random.integers(len(found))][1:]
 
 
@@ -99,7 +99,7 @@ def _truncate(content: bytes, random: np.random.Generator) -> bytes:
 
 
 def _swap_records(content: bytes, random: np.random.Generator) -> bytes:
-    found = [one for one in records(content) if one[0] in (CHUNK, MESSAGE)]
+    found = [record for record in records(content) if record[0] in (CHUNK, MESSAGE)]
     i, j = sorted(random.choice(len(found), 2, replace=False))
     (_, a, b), (_, c, d) = found[i], found[j]
     return content[:a] + content[c:d] + content[b:c] + content[a:b] + content[d:]

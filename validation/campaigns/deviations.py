@@ -191,9 +191,9 @@ def block(content: dict) -> str:
         *runs(figures, WORDS, METHODS),
     ]
     refusals = content["settings"]["clamps_refused"]
-    for setting in dict.fromkeys(one.split(", ")[1] for one in refusals):
+    for setting in dict.fromkeys(refusal.split(", ")[1] for refusal in refusals):
         bands = ", ".join(
-            band for band, own in (one.split(", ") for one in refusals) if own == setting
+            band for band, own in (refusal.split(", ") for refusal in refusals) if own == setting
         )
         summary.append(
             f"With `{setting}` no clamps can be calibrated ({bands}): the default's serve."

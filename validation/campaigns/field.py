@@ -103,8 +103,13 @@ def checked(path: Path, recording: str) -> tuple[list[dict], s2s.Episode | None]
         text = str(error).removeprefix(f"{path}: ")
         return [{"about": "", "concern": "", "what": text, "refused": True}], None
     found = [
-        {"about": one.about, "concern": concern[one.about], "what": one.what, "refused": False}
-        for one in done.findings
+        {
+            "about": finding.about,
+            "concern": concern[finding.about],
+            "what": finding.what,
+            "refused": False,
+        }
+        for finding in done.findings
     ]
     return found, episode_of(done, band, params)
 
@@ -196,15 +201,15 @@ def cases_of(recordings: list[str], sound: list[str], faults: list[str]) -> list
     def of_size(place: int) -> list[Faulty]:
         return [Faulty(r, name, FAULTS[name].sizes[place]) for r in recordings for name in faults]
 
-    whole = [Faulty(one, SOUND, 0.0) for one in dict.fromkeys([*recordings, *sound])]
+    whole = [Faulty(fromkey, SOUND, 0.0) for fromkey in dict.fromkeys([*recordings, *sound])]
     return [*whole[:5], *of_size(1), *of_size(2), *of_size(0), *whole[5:]]
 
 
 def report(args: argparse.Namespace, cases: list[Faulty]) -> None:
     """Write what the results in the work folder say."""
     results: list[dict] = ResultLines(args.work / "results.jsonl").among(cases)
-    sound = [one for one in results if one["fault"] == SOUND]
-    faulty = [one for one in results if one["fault"] != SOUND]
+    sound = [result for result in results if result["fault"] == SOUND]
+    faulty = [result for result in results if result["fault"] != SOUND]
     if not results:
         raise UserError(f"{args.work}: holds no result")
     alarms = [
@@ -230,7 +235,7 @@ def report(args: argparse.Namespace, cases: list[Faulty]) -> None:
 
 
 def _counts(results: list[dict]) -> dict[str, int]:
-    counted = Counter(one.get("outcome", "failed") for one in results)
+    counted = Counter(result.get("outcome", "failed") for result in results)
     return {
         name: counted[name] for name in (*OUTCOMES, "failed") if counted[name] or name == SILENT
     }
@@ -238,7 +243,7 @@ def _counts(results: list[dict]) -> dict[str, int]:
 
 def _family(results: list[dict], family: str) -> dict:
     """Counts of a class, and the largest errors that nothing of its concern reported."""
-    own = [one for one in results if FAULTS[str(one["fault"])].family == family]
+    own = [result for result in results if FAULTS[str(result["fault"])].family == family]
     passed = [one for one in own if "modulus_error" in one]
     factors = [max(one["damping_factor"], 1 / one["damping_factor"]) for one in passed]
     return _counts(own) | {

@@ -168,9 +168,9 @@ def performed(job: OneRecording, work: Path, keep: bool) -> dict:
 def figures(lines: list[dict]) -> dict:
     """By kind of recording: each band's `summary`, and what they say together."""
     result: dict = {}
-    kinds = {id(one): job_of(one).kind for one in lines}
+    kinds = {id(line): job_of(line).kind for line in lines}
     for kind in sorted(set(kinds.values())):
-        some = [one for one in lines if kinds[id(one)] == kind]
+        some = [line for line in lines if kinds[id(line)] == kind]
         good = [one for one in some if "failed" not in one]
         if not good:
             continue
@@ -202,18 +202,18 @@ def brief(line: dict) -> dict:
 
 def together(of_bands: dict[str, dict]) -> dict:
     """Means over bands, and of the coverage what bands drawn anew say in 90 of 100 cases."""
-    bias = np.array([one["mean_bias"] for one in of_bands.values()])
-    covered = np.array([one["coverage"] for one in of_bands.values()])
+    bias = np.array([band["mean_bias"] for band in of_bands.values()])
+    covered = np.array([band["coverage"] for band in of_bands.values()])
     rng = np.random.default_rng(0)
     drawn = rng.choice(covered, (BOOTSTRAP, len(covered))).mean(axis=1)
     return {
         "mean_size_of_bias": np.abs(bias).mean(),
         "worst_bias": bias[np.abs(bias).argmax()],
-        "mean_miss_m": np.mean([one["mean_miss_m"] for one in of_bands.values()]),
+        "mean_miss_m": np.mean([band["mean_miss_m"] for band in of_bands.values()]),
         "coverage": covered.mean(),
         "coverage_by_bands": np.quantile(drawn, [0.05, 0.95]),
         "least_coverage": covered.min(),
-        "median_width": np.median([one["median_width"] for one in of_bands.values()]),
+        "median_width": np.median([band["median_width"] for band in of_bands.values()]),
     }
 
 
@@ -311,9 +311,9 @@ def main() -> int:
     command = f"python -m validation.campaigns.landings {arguments.set}"
     report = environment("cpu", command) | {
         "jobs": [len(lines), len(todo)],
-        "plan.dips": [dict(one) for one in load(DEFAULTS).plan.dips],
+        "plan.dips": [dict(dip) for dip in load(DEFAULTS).plan.dips],
         "figures": figures(lines),
-        "recordings": plain([brief(one) for one in lines], 4),
+        "recordings": plain([brief(line) for line in lines], 4),
     }
     write_json(report_of(arguments.set), report)
     for name, about in report["figures"].items():

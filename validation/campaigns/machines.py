@@ -155,7 +155,7 @@ def compared(reports: dict[str, MachineReport]) -> tuple[list[str], bool]:
             f" {one.seconds:.0f} s |"
         )
     for band, method in product(bands, largest):
-        summary = [one.bands[band][method] for one in reports.values()]
+        summary = [report.bands[band][method] for report in reports.values()]
         largest[method] = max(largest[method], apart(summary))
     met = largest[OURS] <= LIMIT
     lines += ["", f"{OURS}: landings of any two differ by {100 * largest[OURS]:.2g} % at most;"]

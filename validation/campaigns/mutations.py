@@ -140,14 +140,14 @@ def _place(log: str) -> str:
 
 def faults(results: list[Result]) -> list[Result]:
     """What may not be."""
-    return [one for one in results if one["outcome"] == FAULT]
+    return [result for result in results if result["outcome"] == FAULT]
 
 
 def counts(results: list[Result]) -> dict[str, dict[str, dict[str, int]]]:
     """How many there were of each outcome, by family and container."""
     found = {family: {container: Counter() for container in CONTAINERS} for family in FAMILIES}
-    for one in results:
-        found[one["family"]][one["container"]][one["outcome"]] += 1
+    for result in results:
+        found[result["family"]][result["container"]][result["outcome"]] += 1
     return {
         family: {name: dict(sorted(some.items())) for name, some in row.items()}
         for family, row in found.items()
@@ -173,7 +173,7 @@ def summary(results: list[Result], wanted: int) -> dict:
         },
         "figures": {
             "recordings": len(results),
-            "outcomes": dict(Counter(one["outcome"] for one in results)),
+            "outcomes": dict(Counter(result["outcome"] for result in results)),
             "by_family_and_container": counts(results),
             "longest": {**_named(slowest), "cpu_s": slowest["s"]},
             "most_memory": {**_named(largest), "mib": largest["bytes"] / 2**20},
@@ -194,7 +194,7 @@ def main() -> None:
         raise UserError("--count, --workers: from 1 on")
     code = fingerprint(json.dumps(digests(Path(outcomes.__file__))))[:12]
     lines = ResultLines(args.work / code / "results.jsonl")
-    parts = shares(args.count, {key(one) for one in lines.lines})
+    parts = shares(args.count, {key(line) for line in lines.lines})
     start, before = time.monotonic(), len(lines.lines)
     print(f"{before} recordings are done, {sum(b - a for *_, a, b in parts)} are to do", flush=True)
 

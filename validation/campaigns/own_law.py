@@ -51,7 +51,7 @@ def figures(lines: list[dict]) -> dict:
     """By pull: what the ranks of each coordinate and of the landings say."""
     result = {}
     for pull in PULLS:
-        some = [one for one in lines if one["pull"] == pull]
+        some = [line for line in lines if line["pull"] == pull]
         good = [one for one in some if "failed" not in one]
         if not good:
             continue
@@ -64,7 +64,7 @@ def figures(lines: list[dict]) -> dict:
             "refused": [one["failed"] for one in some if "failed" in one],
             "settled": sum(one["settled"] for one in good),
             "ranks": ranks,
-            "met": all(HELD[0] <= one["coverage"] <= HELD[1] for one in ranks.values()),
+            "met": all(HELD[0] <= rank["coverage"] <= HELD[1] for rank in ranks.values()),
         }
     return result
 

@@ -175,12 +175,13 @@ def saved(params: Params, path: Path) -> Path:
 
 def summary(results: list[dict]) -> dict:
     """Of results at TARGETS, or their own: mean error, misses, coverage, width, as shares."""
-    targets = np.array([one.get("targets", TARGETS) for one in results])
+    targets = np.array([result.get("targets", TARGETS) for result in results])
     error, miss, low, high = (
-        np.array([one[name] for one in results], float) for name in ("error", "miss", "low", "high")
+        np.array([result[name] for result in results], float)
+        for name in ("error", "miss", "low", "high")
     )
     confidence = np.isfinite(low) & np.isfinite(miss)
-    inside = np.array([one["inside"] for one in results])[confidence]
+    inside = np.array([result["inside"] for result in results])[confidence]
     return {
         "bias": np.nanmean(error, axis=1),
         "mean_bias": np.nanmean(error),

@@ -65,7 +65,7 @@ class ResultLines:
 
     def where(self, **values: object) -> list[Result]:
         """Lines with these values."""
-        return [one for one in self.lines if all(one[name] == v for name, v in values.items())]
+        return [line for line in self.lines if all(line[name] == v for name, v in values.items())]
 
 
 @contextmanager

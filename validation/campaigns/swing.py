@@ -118,9 +118,10 @@ def as_found(params: Params, band: str, results: list[dict]) -> dict:
     `landing_ratio` is the mean over DRAWS, and `hold_force_ratio` too, beside rod and rod.
     """
     found = {
-        one["switch"]: Parameters.of(NEO_HOOKEAN, one["point"][: len(THETA)])
-        for one in results
-        if (one["band"], one["method"], one["recording"], one["seed"]) == (band, PAPER, 0, 1)
+        result["switch"]: Parameters.of(NEO_HOOKEAN, result["point"][: len(THETA)])
+        for result in results
+        if (result["band"], result["method"], result["recording"], result["seed"])
+        == (band, PAPER, 0, 1)
     }
     done, setup = {}, LaunchSetup.of(params.setup, params.sling)
     for mesh in MESHES:

@@ -35,7 +35,10 @@ def test_recordings_that_this_project_did_not_make(params: Params, progress, rec
     names = ("orange", "orange_2", "orange_3")
     episodes = [orange_episode(params, name) for name in names]
     figures = {}
-    for name, own in [*zip(names, [[one] for one in episodes], strict=True), ("all", episodes)]:
+    for name, own in [
+        *zip(names, [[episode] for episode in episodes], strict=True),
+        ("all", episodes),
+    ]:
         place = FOLDER / (name if name in names else names[0])
         sling = sling_of(params, "orange", OURS, place)
         calibrated, confidence = density.found(params, OURS, sling, own)
@@ -61,7 +64,7 @@ def test_recordings_that_this_project_did_not_make(params: Params, progress, rec
         settings={"arm_stiffness": None},
         figures=figures,
     )
-    assert all(one["inside"] >= 0.85 * one["launches"] for one in figures.values())
+    assert all(figure["inside"] >= 0.85 * figure["launches"] for figure in figures.values())
 
 
 def orange_episode(params: Params, name: str) -> Episode:

@@ -100,7 +100,7 @@ def test_landings_are_predicted_within_the_recorded_stretch(
         progress(f"  {method}: {100 * inside:.2f} % inside, {100 * beyond:.2f} % beyond")
 
     mounting = json.loads((project / "data/clamps" / f"{BAND}.json").read_text("utf-8"))
-    unpredicted = [one for one in figures[OURS]["launches"] if one["predicted_failure"]]
+    unpredicted = [figure for figure in figures[OURS]["launches"] if figure["predicted_failure"]]
     inside = errors[OURS]["inside"]
     met = inside.launches > 0 and inside.mean <= LIMIT and not unpredicted
     record(

@@ -82,8 +82,9 @@ def memory_of(curves: list[Curve], names: tuple[str, ...] = NAMES) -> list[Curve
 
     def left(x: np.ndarray) -> list[np.ndarray]:
         return [
-            (x[0] * history(one.stretch, one.time, values(x)) - one.stress) / one.stress.max()
-            for one in curves
+            (x[0] * history(curve.stretch, curve.time, values(x)) - curve.stress)
+            / curve.stress.max()
+            for curve in curves
         ]
 
     low, high = np.array([REACH[name] for name in names]).T

@@ -47,23 +47,23 @@ def _messages(bag: Bag, what: str) -> list[Message]:
 
 
 def late(what: str, bag: Bag, ms: float) -> None:
-    for one in _messages(bag, what):
-        one.stamp += round(1e6 * ms)
-        one.log += round(1e6 * ms)
+    for message in _messages(bag, what):
+        message.stamp += round(1e6 * ms)
+        message.log += round(1e6 * ms)
 
 
 def drifting(what: str, bag: Bag, ppm: float) -> None:
     start = bag.start
-    for one in _messages(bag, what):
-        one.stamp += round((one.stamp - start) * 1e-6 * ppm)
+    for message in _messages(bag, what):
+        message.stamp += round((message.stamp - start) * 1e-6 * ppm)
 
 
 def stepping(what: str, bag: Bag, ms: float) -> None:
     """The clock is set while the hand pulls."""
     start = bag.start
-    for one in _messages(bag, what):
-        if one.stamp - start > PULLING * 1e9:
-            one.stamp += round(1e6 * ms)
+    for message in _messages(bag, what):
+        if message.stamp - start > PULLING * 1e9:
+            message.stamp += round(1e6 * ms)
 
 
 def frozen(bag: Bag, seconds: float) -> None:
@@ -222,7 +222,7 @@ def stale(bag: Bag, seconds: float) -> None:
     """The first pose is one of long ago."""
     first = copy.deepcopy(bag.of(POSE)[0])
     first.stamp += round(1e9 * seconds)
-    first.log = min(one.log for one in bag.messages)
+    first.log = min(message.log for message in bag.messages)
     bag.messages.insert(0, first)
 
 
@@ -266,9 +266,9 @@ def _set_depth(one: Message, values: np.ndarray) -> None:
 
 def _optical(bag: Bag):
     for message in bag.of(FRAMES):
-        for one in message.content.transforms:
-            if "optical" in one.child_frame_id:
-                yield one.transform
+        for transform in message.content.transforms:
+            if "optical" in transform.child_frame_id:
+                yield transform.transform
 
 
 TIMES, SEEN = ("times", "pictures", "camera"), ("camera", "pictures")

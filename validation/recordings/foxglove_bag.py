@@ -64,7 +64,7 @@ def translate(
 def fields(kind: str, message: object, raw: bool) -> dict[str, object]:
     """A ROS message as the fields of Foxglove's schema, in plain Python."""
     if kind == "TFMessage":
-        return {"transforms": [_transform(one) for one in message.transforms]}
+        return {"transforms": [_transform(transform) for transform in message.transforms]}
     stamp = {"sec": message.header.stamp.sec, "nsec": message.header.stamp.nanosec}
     head = {"timestamp": stamp, "frame_id": message.header.frame_id}
     if kind == "WrenchStamped":

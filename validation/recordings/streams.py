@@ -89,7 +89,7 @@ class Bag:
     def seconds(self, messages: list[Message]) -> np.ndarray:
         """Stamps since the first force [s], shape (S,)."""
         start = self.start
-        return 1e-9 * np.array([one.stamp - start for one in messages])
+        return 1e-9 * np.array([message.stamp - start for message in messages])
 
     @property
     def force(self) -> np.ndarray:

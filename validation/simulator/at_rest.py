@@ -80,7 +80,7 @@ def drawn_pull(bench: Bench, depth: float, theta: np.ndarray) -> tuple[np.ndarra
         sling, setup, parameters, [-depth, 0.0], device=bench.device, workers=bench.workers
     )
     strings = [String.of(sling, one) for one in theta]
-    expected = [2 * float(one.force(stretch)) * depth / half for one in strings]
+    expected = [2 * float(string.force(stretch)) * depth / half for string in strings]
     return done.hold_force, np.array(expected)
 
 

@@ -182,8 +182,8 @@ def failures(figures: Figures) -> int:
 def table(columns: dict[str, Figures]) -> str:
     """Markdown: a row a figure, a column an element."""
     rod = next(iter(columns.values()))
-    far = [compare(one, rod) for one in columns.values()]
-    slings = [one.sling for one in columns.values()]
+    far = [compare(column, rod) for column in columns.values()]
+    slings = [column.sling for column in columns.values()]
     rows: list[tuple[str, list[str]]] = [
         ("edges along the band", [f"{sling.edges}" for sling in slings]),
         (
@@ -192,24 +192,27 @@ def table(columns: dict[str, Figures]) -> str:
         ),
     ]
     for index, depth in enumerate(DEPTHS):
-        values = [f"{100 * (one.pull[index] - 1):+.2f} %" for one in columns.values()]
+        values = [f"{100 * (column.pull[index] - 1):+.2f} %" for column in columns.values()]
         rows.append((f"hold force of a {depth:.2f} m draw, against two strings", values))
     for index, nu in enumerate(POISSON):
-        values = [f"× {one.bending[index]:.2f}" for one in columns.values()]
+        values = [f"× {column.bending[index]:.2f}" for column in columns.values()]
         rows.append((f"bending stiffness against Euler–Bernoulli, ν {nu:.2f}", values))
     for name in far[0]:
         what, _, unit = name.rstrip("]").partition(" [")
         sign = "" if unit == "mm" else "+"
         values = ["", *(f"{one[name]:{sign}.2f} {unit}" for one in far[1:])]
         rows.append((f"{what}, against the rod", values))
-    seconds = [(one.rollout_seconds, one.launch_seconds) for one in columns.values()]
+    seconds = [(column.rollout_seconds, column.launch_seconds) for column in columns.values()]
     rows += [
         ("CPU time of a rollout", [_milliseconds(s, seconds[0][0]) for s, _ in seconds]),
         ("CPU time of a launch", [_milliseconds(s, seconds[0][1]) for _, s in seconds]),
-        ("memory of a rollout", [f"{one.memory / 2**20:.2f} MiB" for one in columns.values()]),
+        (
+            "memory of a rollout",
+            [f"{column.memory / 2**20:.2f} MiB" for column in columns.values()],
+        ),
         (
             f"failed of {len(rod.rollouts.failure)} rollouts and as many launches",
-            [f"{failures(one)}" for one in columns.values()],
+            [f"{failures(column)}" for column in columns.values()],
         ),
     ]
     head = ["| | " + " | ".join(columns) + " |", "|---|" + "---:|" * len(columns)]

@@ -67,7 +67,7 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Measure]:
     sections = motion.x[:, -1]
     g = (sections[:, edge + 1, :3] - sections[:, edge, :3]) / sling.edge_lengths[edge]
     volume = np.einsum("ij,ij->i", g, np.cross(sections[:, edge, 3:6], sections[:, edge, 6:9]))
-    expected = np.array([float(one.volume(stretch)) for one in strings])
+    expected = np.array([float(string.volume(stretch)) for string in strings])
     pull = -motion.force[:, -1, 0]
     ratio = float(strings[1].force(stretch) / strings[0].force(stretch))
     return [

@@ -130,7 +130,7 @@ def order_in_time(bench: Bench, count: int = COUNT) -> list[Measure]:
             SHORT_OF_2,
             f"lowest order {lowest:.2f} of any launch from steps of the default to 1/8 of it; at"
             f" 1, 1/2, 1/4, 1/8 the worst is {', '.join(f'{one:.2g}' for one in worst)} % off,"
-            f" orders {', '.join(f'{one:.2f}' for one in orders)}",
+            f" orders {', '.join(f'{order:.2f}' for order in orders)}",
         )
     ]
 

@@ -42,7 +42,7 @@ def ranges(thetas: list[dict[str, float]], names=THETA) -> str:
     """Between what bounds the parameters of thetas lie; one that all share is named as such."""
 
     def summary(name: str) -> str:
-        low, high = (f"{f([one[name] for one in thetas]):.3g}" for f in (min, max))
+        low, high = (f"{f([theta[name] for theta in thetas]):.3g}" for f in (min, max))
         return f"{name} {low}" if low == high else f"{name} {low}–{high}"
 
     return ", ".join(summary(name) for name in names)

@@ -120,7 +120,9 @@ def summary(sections: list[Theme]) -> tuple[str, int]:
     missed = unmet(checks)
     limited = sum(check.met is not None for check in checks)
     lines = [f"not met: {check.name}: {figure(check)}, limit {limit(check)}" for check in missed]
-    lines += [f"not run: {one.title}: {one.not_run}" for one in sections if one.not_run]
+    lines += [
+        f"not run: {section.title}: {section.not_run}" for section in sections if section.not_run
+    ]
     lines.append(f"{limited - len(missed)} of {limited} limits kept")
     return "\n".join(lines), len(missed)
 

@@ -79,5 +79,5 @@ def test_neither_units_nor_the_direction_of_time_matter(message, unit) -> None:
     back = changes({"e": own[::-1]})
     last = len(own) - 1
     pairs = {(one.earlier, one.later) for one in found if one.chance < 0.99 * FALSE_ALARM}
-    assert pairs <= {(one.earlier, one.later) for one in changes({"e": other})}
+    assert pairs <= {(change.earlier, change.later) for change in changes({"e": other})}
     assert pairs <= {(last - one.later, last - one.earlier) for one in back}

@@ -109,10 +109,10 @@ def test_lines_of_threads_stay_whole(tmp_path: Path) -> None:
             threading.Thread(target=lambda: [run.line("a", "x" * 5000) for _ in range(50)])
             for _ in range(8)
         ]
-        for one in threads:
-            one.start()
-        for one in threads:
-            one.join()
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
     texts = [event["text"] for event in written(tmp_path) if event["what"] == "line"]
     assert texts == ["x" * 5000] * 400
 
@@ -129,7 +129,7 @@ def test_an_entry_of_dvc_lock_is_one_stages_own(tmp_path: Path) -> None:
 
 def test_names_and_tags_are_bands_and_methods() -> None:
     methods = ["no_work", "de", "bo", "adam", "package_si"]
-    stages = ["record@b1", "report", *(f"theta@b2-{one}" for one in methods)]
+    stages = ["record@b1", "report", *(f"theta@b2-{method}" for method in methods)]
     assert log.tags(stages[2]) == ["b2", "no_work"] and log.tags(stages[1]) == []
     name, tags = log.names(stages)
     assert name == "b1, b2: no_work, de, bo, 2 more"

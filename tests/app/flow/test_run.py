@@ -51,7 +51,7 @@ def last(toy: Toy) -> list[dict]:
 
 def overlap(toy: Toy, *names: str) -> bool:
     notes = [toy.note(name) for name in names]
-    return max(one["begin"] for one in notes) < min(one["end"] for one in notes)
+    return max(note["begin"] for note in notes) < min(note["end"] for note in notes)
 
 
 @pytest.mark.slow
@@ -139,7 +139,7 @@ def test_the_ui_shows_runs_that_were_and_the_one_that_is(tmp_path: Path, history
         until(lambda: [one["state_name"] for one in shown()] == ["Completed", "Failed"], SECONDS)
         graph = ask(f"{url}/api", f"/flow_runs/{shown()[0]['id']}/graph-v2")
         nodes = {node["label"]: node for _, node in graph["nodes"]}
-        assert [one["id"] for one in nodes["low"]["parents"]] == [nodes["top"]["id"]]
+        assert [node["id"] for node in nodes["low"]["parents"]] == [nodes["top"]["id"]]
         message = ask(f"{url}/api", "/logs/filter", {})
         assert {"top works", "error: word: says bad; write something else"} <= {
             one["message"] for one in message
@@ -185,7 +185,7 @@ def test_devices_are_shared_out_among_gpu_stages(monkeypatch: pytest.MonkeyPatch
         {"SLING_DEVICE": "cuda:0,cuda:2"},
         {"SLING_DEVICE": "cuda:1"},
     ]
-    assert [one["SLING_DEVICE"] for one in run.gpu_shares({"SLING_DEVICE": "cuda"}, 4)] == [
+    assert [share["SLING_DEVICE"] for share in run.gpu_shares({"SLING_DEVICE": "cuda"}, 4)] == [
         *three,
         "cuda:0",
     ]

@@ -131,7 +131,7 @@ def test_a_server_that_a_full_disk_keeps_from_starting_is_said_so(tmp_path, monk
 
 def listening(pid: int) -> set[tuple[str, int]]:
     family = [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]
-    sockets = [one for process in family for one in process.net_connections("inet")]
+    sockets = [connection for process in family for connection in process.net_connections("inet")]
     return {(one.laddr.ip, one.laddr.port) for one in sockets if one.status == psutil.CONN_LISTEN}
 
 

@@ -28,7 +28,9 @@ def performed(root: Path, place) -> Scheduler:
 def ended(root: Path) -> dict[str, str]:
     """States by stage, and of the run."""
     events = without_time(root)
-    return {one.get("stage", "run"): one["state"] for one in events if one["what"] == "ended"}
+    return {
+        event.get("stage", "run"): event["state"] for event in events if event["what"] == "ended"
+    }
 
 
 def test_what_ran_and_what_came_from_the_cache(tmp_path: Path) -> None:

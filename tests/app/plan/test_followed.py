@@ -35,7 +35,7 @@ class Repeated(Followed):
 
     def at(self, t: float) -> Followed:
         """The pull that is going on or was the last."""
-        begun = [one for one in self.moments if one[0] <= t] or self.moments[:1]
+        begun = [moment for moment in self.moments if moment[0] <= t] or self.moments[:1]
         return Followed(*begun[-1][:1], release=begun[-1][1], draw=self.draw, way=self.way)
 
     def holds(self, t: float) -> bool:

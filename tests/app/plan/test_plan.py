@@ -128,8 +128,8 @@ def test_the_gripper_opens_closes_and_opens(plan, tmp_path) -> None:
     kind = "control_msgs/msg/GripperCommand"
     store.register(get_types_from_msg("float64 position\nfloat64 max_effort", kind))
     commands = json.loads(files[2].read_text())
-    for one in commands:
-        message = build(store, kind, one["command"])
+    for command in commands:
+        message = build(store, kind, command["command"])
         assert store.deserialize_cdr(store.serialize_cdr(message, kind), kind) == message
     positions = [one["command"]["position"] for one in commands]
     assert positions == [0.04, 0.0, 0.04]  # of each finger of a Franka's hand, which goes 0.04 m

@@ -56,7 +56,7 @@ def test_check_lists_the_pulls_and_looks_at_the_first_that_can_be_used(three, se
 
 
 def test_a_pull_alone_has_nothing_to_rest_from(looked, params) -> None:
-    found = {one.about for one in looked.report.cautions}
+    found = {caution.about for caution in looked.report.cautions}
     assert "rest" not in found and looked.report.pulls == [looked.report.row]
 
 

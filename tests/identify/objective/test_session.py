@@ -42,7 +42,7 @@ def serve(method: str, params=PARAMS, stage: str = "history"):
 def test_methods_and_stages_share_what_was_simulated(evaluators: list[Evaluate]) -> None:
     first = serve("sling2sim2real")
     other = serve("no_work", stage="refined")
-    assert [one.count for one in evaluators] == [1, 0]
+    assert [evaluator.count for evaluator in evaluators] == [1, 0]
     np.testing.assert_allclose(first.total, 3 * rosenbrock(UNIT), rtol=1e-12)
     np.testing.assert_allclose(other.total, 2 * rosenbrock(UNIT), rtol=1e-12)
 
@@ -52,7 +52,7 @@ def test_other_params_of_the_terms_start_over(evaluators: list[Evaluate]) -> Non
     serve("sling2sim2real")
     update = {"optimizer": PARAMS.optimizer.model_copy(update={"seed": 5, "k_top": 2})}
     serve("no_work", PARAMS.model_copy(update=update))
-    assert [one.count for one in evaluators] == [1, 0]
+    assert [evaluator.count for evaluator in evaluators] == [1, 0]
     for section, change in (
         ("setup", {"projectile_mass": 0.04}),
         ("sling", {"edges": 30}),
@@ -61,7 +61,7 @@ def test_other_params_of_the_terms_start_over(evaluators: list[Evaluate]) -> Non
     ):
         other = getattr(PARAMS, section).model_copy(update=change)
         serve("sling2sim2real", PARAMS.model_copy(update={section: other}))
-    assert [one.count for one in evaluators] == [1, 0, 1, 1, 1, 1]
+    assert [evaluator.count for evaluator in evaluators] == [1, 0, 1, 1, 1, 1]
 
 
 def test_without_the_clamps_nothing_is_shared_and_nothing_lost(evaluators) -> None:
@@ -70,7 +70,7 @@ def test_without_the_clamps_nothing_is_shared_and_nothing_lost(evaluators) -> No
     params = PARAMS.model_copy(update={"methods": methods})
     for method in ("sling2sim2real", "bare", "sling2sim2real", "bare"):
         serve(method, params)
-    assert [one.count for one in evaluators] == [1, 1, 0, 0]
+    assert [evaluator.count for evaluator in evaluators] == [1, 1, 0, 0]
 
 
 def test_another_number_of_gpus_does_not(evaluators: list[Evaluate], monkeypatch) -> None:
@@ -79,7 +79,7 @@ def test_another_number_of_gpus_does_not(evaluators: list[Evaluate], monkeypatch
     for device in ("cpu", "cuda:0", "cuda", "cuda:1,cuda:0"):
         monkeypatch.setenv("SLING_DEVICE", device)
         serve("sling2sim2real")
-    assert [one.count for one in evaluators] == [1, 1, 0, 0]
+    assert [evaluator.count for evaluator in evaluators] == [1, 1, 0, 0]
 
 
 def test_another_episode_starts_over(evaluators: list[Evaluate]) -> None:
@@ -88,7 +88,7 @@ def test_another_episode_starts_over(evaluators: list[Evaluate]) -> None:
     serve("sling2sim2real")
     write_json(Layout().clamps("band1"), {"clamp_angle_deg": 1.0})
     serve("sling2sim2real")
-    assert [one.count for one in evaluators] == [1, 1, 1]
+    assert [evaluator.count for evaluator in evaluators] == [1, 1, 1]
 
 
 def test_all_episodes_of_a_band_come_in_their_order(evaluators: list[Evaluate]) -> None:

@@ -32,7 +32,9 @@ def test_it_finds_scipys_minimum(count):
     best = least(seen, box, START)
     assert found.settled and away(found, best) < 0.05
     assert len(found.expansions) == count and found.nuisances.shape == (count, 3)
-    np.testing.assert_allclose(found.hessian, sum(one.hessian for one in found.expansions))
+    np.testing.assert_allclose(
+        found.hessian, sum(expansion.hessian for expansion in found.expansions)
+    )
 
 
 def test_a_bound_holds_the_mode_and_the_others_give_way(monkeypatch):
@@ -178,9 +180,9 @@ def test_disagreement_of_mere_noise_is_one_on_average():
     for seed in range(200):
         first = fit(curves(3, seed=seed), space(), TRUE)
         total = freedom = 0.0
-        for one in first.expansions:
-            inverse = np.linalg.inv(one.hessian)
-            total += one.gradient @ inverse @ one.gradient
+        for expansion in first.expansions:
+            inverse = np.linalg.inv(expansion.hessian)
+            total += expansion.gradient @ inverse @ expansion.gradient
             freedom += 3 * (1 - 1 / 3)
         squares.append(total / freedom)
         assert disagreement(first) == pytest.approx(max(np.sqrt(squares[-1]), 1.0), rel=0.25)

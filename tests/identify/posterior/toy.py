@@ -60,7 +60,7 @@ def least(recordings, coordinates: Coordinates, start: np.ndarray) -> np.ndarray
 
     def gaps(x: np.ndarray) -> np.ndarray:
         phi = x * SIZE
-        data = [(one.seen - curve(phi)) / one.sigma for one in recordings]
+        data = [(recording.seen - curve(phi)) / recording.sigma for recording in recordings]
         return np.concatenate([*data, root * (phi - coordinates.expected)])
 
     ends = coordinates.low / SIZE, coordinates.high / SIZE

@@ -86,9 +86,9 @@ def test_a_rig_band_is_launched_and_measured_launches_stand_apart(tried) -> None
     assert rows.trial.tolist() == [1, 2, 1, 2, 1]
     virtual = rows[:4]
     assert virtual.hold_force.nunique() == 4  # each trial has errors of its own
-    for one in virtual.itertuples():
-        assert one.flight_z[-1] == pytest.approx(-0.52)
-        assert (one.failure is None) == (1.425 <= one.flight_y[-1] <= 2.425)
-        assert one.landing_y == one.flight_y[-1]  # where it counts as failed, too
+    for row in virtual.itertuples():
+        assert row.flight_z[-1] == pytest.approx(-0.52)
+        assert (row.failure is None) == (1.425 <= row.flight_y[-1] <= 2.425)
+        assert row.landing_y == row.flight_y[-1]  # where it counts as failed, too
     assert virtual.failure.str.startswith("beyond the area: lands at").all()
     assert rows.flight_y[4] is None and rows.landing_y[4] == 2.2

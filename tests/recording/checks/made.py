@@ -28,4 +28,4 @@ def with_facts(done: Checked, **facts) -> Checked:
 
 
 def abouts(findings: Iterable[Finding]) -> set[str]:
-    return {one.about for one in findings}
+    return {finding.about for finding in findings}

@@ -257,7 +257,7 @@ def test_a_clock_that_runs_fast_is_said(checked) -> None:
         (1e-5, 1e-6, ""),
     ):
         odd = with_recording(checked, pose=replace(pose, drift=ClockRate(rate, error, 4.0)))
-        words = [one.what for one in times.findings(odd) if one.about == "clock_drift"]
+        words = [finding.what for finding in times.findings(odd) if finding.about == "clock_drift"]
         assert any(pose.topic in what and "+2000" in what for what in words) == bool(message)
         assert all(message in what for what in words)
 
@@ -272,5 +272,7 @@ def test_a_pose_that_nothing_ties_to_the_force_is_said(checked) -> None:
 @pytest.mark.fires("clocks_disagree")
 def test_two_estimates_of_a_delay_that_disagree_are_said(checked) -> None:
     odd = replace(checked, delays=replace(checked.delays, conflict="one says 3 ms, one -9 ms"))
-    message = [one.what for one in times.findings(odd) if one.about == "clocks_disagree"]
+    message = [
+        finding.what for finding in times.findings(odd) if finding.about == "clocks_disagree"
+    ]
     assert message == ["one says 3 ms, one -9 ms"]

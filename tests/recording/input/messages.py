@@ -27,7 +27,9 @@ def head(k: int, frame: str = "base") -> dict:
 def channel(topic: str, kind: str, messages: list[dict], rate: float = RATE) -> Channel:
     schema = Schema(1, b"{}", "jsonschema", kind)
     times = [5_000_000_000 + round(1e9 * k / rate) for k in range(len(messages))]
-    return Channel(topic, schema, "json", times, [json.dumps(one).encode() for one in messages])
+    return Channel(
+        topic, schema, "json", times, [json.dumps(message).encode() for message in messages]
+    )
 
 
 def wrench(topic: str, rate: float = 1000.0, count: int = COUNT) -> Channel:

@@ -147,7 +147,9 @@ def test_metadata_that_is_none_is_one_line(parts, text) -> None:
 def test_a_bag_whose_parts_hold_too_much_is_refused(parts, monkeypatch, tmp_path) -> None:
     """The limit is the recording's, not the part's."""
     read = read_container(parts[0])
-    total = sum(OVERHEAD + len(payload) for one in read.channels for payload in one.payloads)
+    total = sum(
+        OVERHEAD + len(payload) for channel in read.channels for payload in channel.payloads
+    )
     monkeypatch.setattr("pipeline.recording.input.container.MOST", total - 1)
     with pytest.raises(UserError, match="holds more than"):
         read_container(parts[0])

@@ -224,7 +224,7 @@ def test_the_machine_clock_steps_back_in_all_topics(tmp_path, params, good) -> N
     )
     for role, stream in found.streams.items():
         assert np.abs(stream.stamp - good.streams[role].stamp).max() < 0.1 * MS, role
-    assert any("step of its machine's clock of -0.8004 s" in one for one in found.losses)
+    assert any("step of its machine's clock of -0.8004 s" in loss for loss in found.losses)
 
 
 def test_an_uneven_topic_with_a_step_is_refused(tmp_path, params) -> None:
@@ -295,7 +295,7 @@ def test_a_frozen_sensor_is_remarked_on(tmp_path, params) -> None:
             message.wrench = held.setdefault("wrench", message.wrench)
 
     found = read(tmp_path, params, change=edit(wrench=freeze))
-    assert any("/ft/wrench: the same value 250 times from 2.00 s" in one for one in found.notes)
+    assert any("/ft/wrench: the same value 250 times from 2.00 s" in note for note in found.notes)
 
 
 def test_shifted_puts_late_stamps_right(good) -> None:

@@ -24,7 +24,7 @@ def whole(tmp_path_factory):
 
 
 def counts(path) -> dict[str, int]:
-    return {one.topic: len(one.payloads) for one in read_container(path).channels}
+    return {channel.topic: len(channel.payloads) for channel in read_container(path).channels}
 
 
 @pytest.mark.parametrize("suffix", PACKERS)
@@ -65,7 +65,10 @@ def test_a_split_bag_of_packed_parts(whole, tmp_path) -> None:
         (b"SQLite format 3\0", "ros2 bag convert"),
         (b"PK\x03\x04", "ZIP"),
         (bytes(50), "not an MCAP file"),
-        (gzip.compress(b"version https://git-lfs", mtime=0), "what is packed in it is a Git LFS pointer"),
+        (
+            gzip.compress(b"version https://git-lfs", mtime=0),
+            "what is packed in it is a Git LFS pointer",
+        ),
     ],
 )
 def test_what_else_it_is(tmp_path, first, message) -> None:

@@ -127,7 +127,7 @@ def test_a_missing_topic_is_named(params, blind) -> None:
         ("compressedDepth", "no depth images"),
         ("camera_info", "no camera info"),
     ):
-        left = [one for one in container.channels if part not in one.topic]
+        left = [channel for channel in container.channels if part not in channel.topic]
         with pytest.raises(UserError, match=words) as caught:
             recording_of(replace(container, channels=left), params.setup)
         assert str(blind[0]) in str(caught.value) and "\n" not in str(caught.value)

@@ -42,7 +42,9 @@ def test_the_same_masks_give_the_same_episode_to_the_byte(masked, params, by_fol
     ours, theirs = (build_episodes(masked, "band1", one)[0][0] for one in (params, by_folder))
     for name in ("time", "position", "velocity", "force", "opening", "cloud_time", "camera"):
         assert getattr(ours, name).tobytes() == getattr(theirs, name).tobytes()
-    assert [one.tobytes() for one in ours.clouds] == [one.tobytes() for one in theirs.clouds]
+    assert [cloud.tobytes() for cloud in ours.clouds] == [
+        cloud.tobytes() for cloud in theirs.clouds
+    ]
     assert sum(map(len, ours.clouds)) > 1000
     assert theirs.metadata["preprocessing"]["mask"] == "folder"
 

@@ -55,7 +55,9 @@ def test_a_dip_is_recommended_where_no_pull_unloads() -> None:
     spread = np.sqrt(np.einsum("td,de,te->t", gradient, covariance, gradient) + model.draw**2)
     free = LandingModel(names, covariance, gradient, model.draw, 1.645 * spread)
     (explained,) = [
-        one for one in next_steps("toy", [], free, targets, pulls, unloaded=False) if "dip" in one
+        step
+        for step in next_steps("toy", [], free, targets, pulls, unloaded=False)
+        if "dip" in step
     ]
     less = free.after(free.exact(["softening"]))[1]
     after = float(explained.split("±")[2].split()[0]) / 100

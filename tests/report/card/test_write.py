@@ -112,7 +112,7 @@ def test_places_are_whole_millimetres_and_clouds_thinner() -> None:
     np.testing.assert_allclose(whole / 1000, points, atol=5.1e-4)
     thin = thinned(points, 90)
     assert thin.shape == (90, 3)
-    assert {tuple(one) for one in thin} <= {tuple(one) for one in points}
+    assert {tuple(point) for point in thin} <= {tuple(point) for point in points}
     assert thinned(points[:0], 90).shape == (0, 3)
 
 

@@ -98,7 +98,7 @@ def test_other_settings_of_the_campaign_are_named_beside_its_numbers(tmp_path) -
     methods["adam"] = PARAMS.methods["adam"].model_copy(update={"mounting": False})
     ours = with_(ours, "trials", targets=(1.9,)).model_copy(update={"methods": methods})
     keys = ["methods.adam.mounting", "optimizer.cma_rollouts", "trials.targets"]
-    assert [one.key for one in repeated.changed_settings(ours)] == keys
+    assert [setting.key for setting in repeated.changed_settings(ours)] == keys
     message = claims(repeated, ours)
     assert f"other settings than this run: {', '.join(keys)}." in " ".join(message)
 

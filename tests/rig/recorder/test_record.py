@@ -61,7 +61,10 @@ def vector(of: Any) -> np.ndarray:
 
 
 def transforms(messages: dict[str, list[Any]]) -> dict[str, Any]:
-    return {one.child_frame_id: one.transform for one in messages["/tf_static"][0].transforms}
+    return {
+        transform.child_frame_id: transform.transform
+        for transform in messages["/tf_static"][0].transforms
+    }
 
 
 def test_topics_and_counts(messages: dict[str, list[Any]], coarse: Params) -> None:

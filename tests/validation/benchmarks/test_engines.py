@@ -19,7 +19,7 @@ def test_a_missing_peer_is_an_entry_that_says_so(monkeypatch):
     assert ours["ratio"] == 1.0
     assert abs(ours["force_error"]) < 0.02
     assert len(bench.table([ours, *peers]).splitlines()) == 3
-    assert [(one["name"], one["note"]) for one in peers] == [
+    assert [(peer["name"], peer["note"]) for peer in peers] == [
         ("mujoco", "mujoco is not installed: make setup"),
         ("newton", "newton is not installed: pip install -e '.[export]' -c constraints.txt"),
     ]

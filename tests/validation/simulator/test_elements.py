@@ -34,9 +34,9 @@ def test_taut_both_say_nearly_the_same_and_the_rod_says_it_sooner(columns):
 
 
 def test_centre_lines_are_compared_at_the_same_places(columns):
-    for one in columns.values():
-        ends = one.lines[:, :, [0, -1]]
-        assert ends == pytest.approx(np.broadcast_to(one.sling.tips, ends.shape), abs=1e-6)
+    for column in columns.values():
+        ends = column.lines[:, :, [0, -1]]
+        assert ends == pytest.approx(np.broadcast_to(column.sling.tips, ends.shape), abs=1e-6)
 
 
 def test_table_has_a_cell_for_every_element(columns):

@@ -190,9 +190,9 @@ def report(lines: ResultLines, kills: int, disks: int, expected: dict, names: li
     }
     killed, filled = (sum(one[by] for one in done.values()) for by in ("kill", "full disk"))
     faults = [
-        {"name": one["name"], "by": one["by"], "fault": fault}
-        for one in attempts
-        for fault in one["faults"]
+        {"name": attempt["name"], "by": attempt["by"], "fault": fault}
+        for attempt in attempts
+        for fault in attempt["faults"]
     ]
     same = all(one[check] for one in rounds for check in CHECKS)
     complete = killed >= kills and filled >= disks and all(
@@ -202,7 +202,7 @@ def report(lines: ResultLines, kills: int, disks: int, expected: dict, names: li
         for by in ("kill", "full disk")
         if done[name][by]
     )  # fmt: skip
-    hits = Counter(kill["hit"] for one in attempts for kill in one.get("kills", ()))
+    hits = Counter(kill["hit"] for attempt in attempts for kill in attempt.get("kills", ()))
     return {
         "asked": ASKED.format(kills=kills, disks=disks, prompt=PROMPT),
         "met": complete and same and not faults,
@@ -220,15 +220,17 @@ def report(lines: ResultLines, kills: int, disks: int, expected: dict, names: li
             "full_disks": filled,
             "of": done,
             "hit": dict(hits.most_common()),
-            "half_lock_files_cut_back": sum(one["mended"] for one in attempts),
+            "half_lock_files_cut_back": sum(attempt["mended"] for attempt in attempts),
             "attempts": len(attempts),
-            "seconds": round(sum(one["seconds"] for one in attempts), 1),
+            "seconds": round(sum(attempt["seconds"] for attempt in attempts), 1),
             "undisturbed_s": {name: one["seconds"] for name, one in expected.items()},
             "files": {name: len(one["files"]) for name, one in expected.items()},
             "stages": {name: len(one["locks"]) for name, one in expected.items()},
             "rounds": rounds,
             "left_in_tmp": sorted({one for some in rounds for one in some["left_in_tmp"]}),
-            "said_of_full_disks": dict(Counter(one["said"] for one in attempts if one.get("said"))),
+            "said_of_full_disks": dict(
+                Counter(attempt["said"] for attempt in attempts if attempt.get("said"))
+            ),
             "faults": faults,
         },
     }

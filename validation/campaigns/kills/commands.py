@@ -108,7 +108,7 @@ class StruckCopy(ProjectCopy):
 
     def left(self, seconds: float) -> list[str]:
         """Commands of what lives still after so long, services apart; it is ended then."""
-        apart = {one.pid for one in self.services}
+        apart = {service.pid for service in self.services}
         alive = lambda: [one for one in self.run.alive() if one.pid not in apart]  # noqa: E731
         wait(lambda: not alive(), seconds)
         found = alive()

@@ -56,7 +56,7 @@ def halves(folder: Path, *wholes: dict[str, str]) -> list[str]:
     """Files that a run makes which are there and are not as in one of `wholes`."""
     here = {name: digest for name, digest in contents(folder).items() if name.split("/")[0] in MADE}
     return sorted(
-        name for name, digest in here.items() if digest not in {one.get(name) for one in wholes}
+        name for name, digest in here.items() if digest not in {whole.get(name) for whole in wholes}
     )
 
 
@@ -96,7 +96,7 @@ def held(folder: Path) -> list[str]:
             content = json.loads(rwlock.read_text(encoding="utf-8"))
             holders = [*content.get("write", {}).values()]
             holders += [one for some in content.get("read", {}).values() for one in some]
-            lives = any(psutil.pid_exists(one["pid"]) for one in holders)
+            lives = any(psutil.pid_exists(holder["pid"]) for holder in holders)
         except (ValueError, AttributeError, TypeError, KeyError):
             lives = True
         found += [".dvc/tmp/rwlock"] if lives else []

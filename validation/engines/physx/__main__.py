@@ -28,7 +28,7 @@ def main() -> None:
     content = {
         "asked": study.ASK,
         "met": not unmet(checks) and study.fast_enough(speeds),
-        "checks": [_plain(one) for one in checks],
+        "checks": [_plain(check) for check in checks],
         "speeds": speeds,
     }
     write_json(REPORT, content | about)

@@ -156,10 +156,10 @@ def compared(band: ExportedBand, launches: list[dict], stiffness, engine) -> lis
 def met(rows: list[dict]) -> bool:
     """Whether each draw keeps both limits."""
     return bool(rows) and all(
-        one["hold_force_error"] is not None
-        and abs(one["hold_force_error"]) <= LIMIT
-        and one["clamps_yield_m"] <= SLIP
-        for one in rows
+        row["hold_force_error"] is not None
+        and abs(row["hold_force_error"]) <= LIMIT
+        and row["clamps_yield_m"] <= SLIP
+        for row in rows
     )
 
 
@@ -183,7 +183,7 @@ def main() -> None:
         rows = compared(band, launches, stiffness, engine)
     content = {"asked": ASKED, "met": met(rows), "band": name, "matched": card["matched"]}
     write_json(REPORT, content | {"draws": rows} | about)
-    errors_there = [one["hold_force_error"] for one in rows]
+    errors_there = [row["hold_force_error"] for row in rows]
     worst = max((np.inf if one is None else abs(one) for one in errors_there), default=np.nan)
     print(f"{REPORT}: {len(rows)} draws, held force off by at most {100 * worst:.1f} %")
 

@@ -57,7 +57,7 @@ def rollouts(sling, tube: Tube, episode, thetas: np.ndarray, courses) -> Rollout
     """
     with np.errstate(all="ignore"):  # burst bands
         bands = motions(tube, thetas, courses)
-    held, free = (len(one.positions) for one in courses[1:])
+    held, free = (len(course.positions) for course in courses[1:])
     marks = episode.release_time + np.arange(1 - held, free + 1) / RATE
     times = [episode.grasp_time - 1 / RATE, *marks[:held]]
     times += [episode.release_time + sling.finger_opening_time, marks[-1]]

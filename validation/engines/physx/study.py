@@ -263,7 +263,7 @@ def speeds(bench: Bench, engine: Engine) -> list[dict]:
 
 def fast_enough(entries: list[dict]) -> bool:
     """Whether 64 bands at once make the rollouts a second that were asked for."""
-    named = {one["environments"]: one["physx_rollouts_per_s"] for one in entries}
+    named = {entry["environments"]: entry["physx_rollouts_per_s"] for entry in entries}
     return named[ENVIRONMENTS[1]] >= ASKED
 
 

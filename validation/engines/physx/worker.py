@@ -44,7 +44,7 @@ class Attached:
             )
         ]
         self._buffers = [
-            wp.zeros(one.shape, dtype=wp.float32, device=DEVICE) for one in self._views
+            wp.zeros(view.shape, dtype=wp.float32, device=DEVICE) for view in self._views
         ]
         self.state()  # takes the first step
         self.seconds = time.perf_counter() - began
@@ -61,8 +61,8 @@ class Attached:
         self._views[which].write(self._buffers[which])
 
     def close(self) -> None:
-        for one in self._views:
-            one.destroy()
+        for view in self._views:
+            view.destroy()
         self._physx.wait_task(self._physx.detach_ovstage())
         self._stage.destroy()
 

@@ -20,9 +20,11 @@ def trials() -> pd.DataFrame:
 def dots(ax) -> dict[int, list[float]]:
     """Places on the axis by row."""
     found = {}
-    for one in ax.collections:
-        for x, y in np.ma.getdata(one.get_offsets()) if len(one.get_offsets()) else ():
-            if one.get_paths() and hasattr(one, "get_sizes"):
+    for collection in ax.collections:
+        for x, y in (
+            np.ma.getdata(collection.get_offsets()) if len(collection.get_offsets()) else ()
+        ):
+            if collection.get_paths() and hasattr(collection, "get_sizes"):
                 found.setdefault(round(y), []).append(x)
     return found
 
@@ -68,8 +70,8 @@ def test_predictions_lie_in_intervals_that_are_called_what_they_are(retained) ->
     (ax,) = retained[0].axes  # nothing landed on the other band
     for row in dots(ax).values():
         np.testing.assert_allclose(sorted(row), sorted(ERRORS))
-    lines = [one for one in ax.collections if hasattr(one, "get_segments")]
-    solid, dotted = (one.get_linestyle()[0][1] for one in lines)
+    lines = [collection for collection in ax.collections if hasattr(collection, "get_segments")]
+    solid, dotted = (line.get_linestyle()[0][1] for line in lines)
     assert solid is None and dotted is not None
     ends = np.array([segment[:, 0] for segment in lines[0].get_segments()])
     widths = 100 * 0.05 / np.array([1.695, 1.745, 1.965])

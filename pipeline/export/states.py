@@ -1,0 +1,69 @@
+"""For which states a match holds: what other pauses and earlier draws do to the calibrated band.
+
+Springs have no memory. They are matched to a band that was drawn as far as the recording before,
+in the recording's time, and let go after its pause. The band itself relaxes and softens; by how
+much it then holds and lands otherwise is computed here, with the calibrated simulation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from pipeline.export.band import CalibratedBand
+from pipeline.report.quantities import rounded
+from pipeline.simulator.launch import launch
+
+PAUSES = 1 / 3, 3.0, 10.0  # times that of the match
+FARTHER = 0.05  # m, of an earlier draw
+
+
+@dataclass(frozen=True)
+class StateChange:
+    """What another state of the band changes, beside the one of the match.
+
+    Attributes:
+        pause_s: From the end of the draw to the release [s].
+        drawn_before_m: The farthest earlier draw [m]; 0: there was none.
+        hold_force_change, landing_change: Largest relative change over the draws, signed.
+    """
+
+    pause_s: float
+    drawn_before_m: float
+    hold_force_change: float
+    landing_change: float
+
+
+def state_changes(model: CalibratedBand, draws: np.ndarray) -> list[dict[str, float]]:
+    """What other pauses and earlier draws change at draws (N, 2); nothing of a law without memory.
+
+    Draws that do not land in either state are left out.
+    """
+    setup = model.launch_setup
+    if setup.history is None:
+        return []
+    matched = model.launches(draws)
+    before = float(np.max(setup.history.deepest))
+    states = [{"pause": factor * setup.history.pause} for factor in PAUSES]
+    if model.parameters.sample().get("softening"):
+        states += [{"deepest": 0.0}, {"deepest": before + FARTHER}]
+    changes = []
+    for state in states:
+        history = replace(setup.history, **state)
+        other = launch(model.sling, replace(setup, history=history), model.parameters, draws)
+        changes.append(
+            StateChange(
+                pause_s=history.pause,
+                drawn_before_m=float(np.max(history.deepest)),
+                hold_force_change=_largest(other.hold_force / matched.hold_force - 1),
+                landing_change=_largest(other.landing_y / matched.landing_y - 1),
+            )
+        )
+    return [{name: rounded(value) for name, value in asdict(one).items()} for one in changes]
+
+
+def _largest(changes: np.ndarray) -> float:
+    """The change (N,) of the largest size; NaN, of draws that do not land, counts as none."""
+    finite = changes[np.isfinite(changes)]
+    return float(finite[np.abs(finite).argmax()]) if len(finite) else 0.0

@@ -49,6 +49,7 @@ class ExportedBand:
         tube: Its mesh; `hanging` and `clamped` are where it begins, `arc` is empty.
         young, poisson: Of its material [Pa, -].
         rate: Steps a second that it asks for.
+        times: That it hangs, is drawn, and is held [s].
     """
 
     text: str
@@ -56,6 +57,7 @@ class ExportedBand:
     young: float
     poisson: float
     rate: int
+    times: tuple[float, float, float] = (HANG, PULL, HOLD)
 
     @classmethod
     def read(cls, path: Path) -> ExportedBand:
@@ -79,23 +81,19 @@ class ExportedBand:
         tube = Tube(rest, tetrahedra, mass, begin, begin, np.zeros(0))
         return cls(text, tube, young, poisson, rate)
 
-    def held(self, engine: Engine, place: np.ndarray) -> tuple[float, float]:
-        """Force on a hand that draws the middle to `place` (3,) and holds it [N].
-
-        By the stress of PhysX's law in the tetrahedra that it reaches. And how far the ends in the
-        clamps have gone [m].
-        """
+    def job(self, place: np.ndarray) -> dict:
+        """What worker.py is to do: hang the band, and lead its middle to `place` (3,) [m]."""
         tube = self.tube
         rows = np.arange(tube.mass.size).reshape(tube.rest.shape[:2])
         flat = tube.clamped.reshape(-1, 3)
-        hang, pull, hold = (round(one * self.rate) for one in (HANG, PULL, HOLD))
+        hang, pull, hold = (round(time * self.rate) for time in self.times)
         part = np.minimum(np.arange(1, pull + hold + 1) / pull, 1)
         part = part**3 * (10 - 15 * part + 6 * part**2)
         begin = tube.clamped[tube.middle].mean(axis=0)
         path = begin + part[:, None] * (place - begin)
         led = path[:, None] + tube.rest[tube.middle] * [0.0, 1.0, 1.0]
         none = np.zeros(hang + pull + hold, bool)
-        job = {
+        return {
             "step": 1 / self.rate,
             "phases": 2,
             "offsets": np.zeros((1, 3)),
@@ -111,8 +109,17 @@ class ExportedBand:
             "fade_1": 1 - part,
             "keep_1": np.arange(pull + hold) == pull + hold - 1,
         }
-        last = engine.run(self.text, job)["positions_1"][-1, 0].reshape(tube.rest.shape)
-        last = last.astype(float)
+
+    def held(self, engine: Engine, place: np.ndarray) -> tuple[float, float]:
+        """Force on a hand that draws the middle to `place` (3,) and holds it [N].
+
+        By the stress of PhysX's law in the tetrahedra that it reaches. And how far the ends in the
+        clamps have gone [m].
+        """
+        tube = self.tube
+        rows = np.arange(tube.mass.size).reshape(tube.rest.shape[:2])
+        done = engine.run(self.text, self.job(place))
+        last = done["positions_1"][-1, 0].reshape(tube.rest.shape).astype(float)
         force = force_on(tube, [tube.middle], last, self.young, self.poisson)
         weight = tube.mass[rows[tube.middle]].sum() * GRAVITY
         ends = [0, 1, -2, -1]

@@ -52,7 +52,7 @@ class _WithoutTypes(ast.NodeTransformer):
 def imports(file: Path, root: Path = ROOT) -> set[Path]:
     """Project files that `file` imports itself, with native sources that lie beside a module."""
     package = file.relative_to(root).parent.parts
-    found: set[Path] = set()
+    modules: set[Path] = set()
     tree = ast.parse(file.read_text(encoding="utf-8"), str(file))
     for node in ast.walk(_WithoutTypes().visit(tree)):
         if isinstance(node, ast.Import):
@@ -63,8 +63,8 @@ def imports(file: Path, root: Path = ROOT) -> set[Path]:
             names = [base, *(f"{base}.{alias.name}" for alias in node.names)]
         else:
             continue
-        found.update(file for name in names for file in files_of(name, root))
-    return found
+        modules.update(file for name in names for file in files_of(name, root))
+    return modules
 
 
 def closure(script: Path, root: Path = ROOT) -> list[str]:
@@ -95,9 +95,9 @@ def concern(file: str) -> str:
 def digests(*scripts: Path, root: Path = ROOT) -> dict[str, str]:
     """A digest of each concern that scripts run, by its path, sorted."""
     files = {file for script in scripts for file in closure(script, root)}
-    tracked = {concern(one) for one in files if one.startswith(CODE)}
+    tracked = {concern(file) for file in files if file.startswith(CODE)}
     tracked -= {*UNCOUNTED, *(f"{top}__init__.py" for top in CODE)}
-    return {one: found for one in sorted(tracked) if (found := digest(root / one))}
+    return {name: content for name in sorted(tracked) if (content := digest(root / name))}
 
 
 def digest(part: Path) -> str | None:
@@ -106,4 +106,4 @@ def digest(part: Path) -> str | None:
         return None
     if part.is_file():
         return fingerprint(part)[:12]
-    return fingerprint(part, *sorted(one for one in part.rglob("*") if one.is_dir()))[:12]
+    return fingerprint(part, *sorted(path for path in part.rglob("*") if path.is_dir()))[:12]

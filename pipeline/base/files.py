@@ -32,8 +32,8 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     with _temporary(path) as temporary:
         temporary.mkdir()
         yield temporary
-        for one in (*temporary.rglob("*"), temporary):
-            _sync(one)
+        for inner in (*temporary.rglob("*"), temporary):
+            _sync(inner)
         shutil.rmtree(path, ignore_errors=True)
         os.replace(temporary, path)
         _sync(path.parent)

@@ -27,8 +27,8 @@ def settle() -> None:
     """
     if not os.path.isabs(os.path.expanduser("~")):
         os.environ["HOME"] = str(_elsewhere())
-    own = os.environ.get("XDG_CACHE_HOME", "")
-    cache = Path(own if os.path.isabs(own) else os.path.expanduser("~/.cache"))
+    user_cache = os.environ.get("XDG_CACHE_HOME", "")
+    cache = Path(user_cache if os.path.isabs(user_cache) else os.path.expanduser("~/.cache"))
     if not all(map(_has_room, (cache, cache / "warp", cache / "matplotlib"))):
         os.environ["XDG_CACHE_HOME"] = str(_elsewhere())
     if not _has_room(Path(os.environ.get("MPLCONFIGDIR") or os.path.expanduser("~/.config"))):
@@ -54,8 +54,8 @@ def _elsewhere() -> Path:
         ) from None
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
-        about = folder.lstat()
-        if about.st_uid == os.getuid() and about.st_mode & 0o777 == 0o700 and folder.is_dir():
+        status = folder.lstat()
+        if status.st_uid == os.getuid() and status.st_mode & 0o777 == 0o700 and folder.is_dir():
             return folder
     except OSError:
         pass

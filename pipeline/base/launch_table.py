@@ -53,7 +53,7 @@ def file_of(folder: Path, band: str, bands: Collection[str]) -> Path | None:
     Raises:
         UserError: There is a CSV of no band, which nobody would ever read.
     """
-    files = [f"{one}.csv" for one in bands]
+    files = [f"{name}.csv" for name in bands]
     for path in sorted(folder.glob("[!.]*")):
         if path.suffix.lower() == ".csv" and path.name not in files:
             raise UserError(
@@ -66,7 +66,7 @@ def file_of(folder: Path, band: str, bands: Collection[str]) -> Path | None:
 def rows(path: Path, kind: str) -> list[LaunchRow]:
     """Lines that are not empty, of a CSV of scores or of evidence. Raises UserError."""
     required = (*DRAW, LANDING)
-    known = (*required, *MORE[kind])
+    columns = (*required, *MORE[kind])
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file)
@@ -79,23 +79,23 @@ def rows(path: Path, kind: str) -> list[LaunchRow]:
         raise UserError(f"{path}: cannot be read as CSV ({error})") from error
     problems = [
         *(f"lacks the column {name}" for name in required if name not in names),
-        *(f"unknown column {name!r}" for name in names if name not in known),
-        *(f"two columns {name}" for name in known if names.count(name) > 1),
+        *(f"unknown column {name!r}" for name in names if name not in columns),
+        *(f"two columns {name}" for name in columns if names.count(name) > 1),
     ]
     if problems:
-        raise UserError(f"{path}: {problems[0]}; columns are {','.join(known)}")
-    found = []
+        raise UserError(f"{path}: {problems[0]}; columns are {','.join(columns)}")
+    result = []
     for line, cells in lines:
         if None in cells:
             raise UserError(f"{path}, line {line}: more cells than the {len(names)} columns")
-        row = {name: (cells.get(name) or "").strip() for name in known}
+        row = {name: (cells.get(name) or "").strip() for name in columns}
         if any(row.values()):
             where = f"{path}, line {line}"
             y, z, landing = (metres(where, name, row[name]) for name in required)
             if y is None or z is None:
                 raise UserError(f"{where}: a draw needs draw_y_m and draw_z_m")
-            found.append(LaunchRow(where, row, (y, z), landing))
-    return found
+            result.append(LaunchRow(where, row, (y, z), landing))
+    return result
 
 
 def metres(where: str, name: str, text: str) -> float | None:
@@ -124,7 +124,7 @@ def number(where: str, name: str, text: str) -> float:
 
 def among(launch: Launch, launches: Collection[Launch]) -> bool:
     """Whether a launch is one of `launches`: draw and landing alike."""
-    return any(math.dist(launch, one) < SAME for one in launches)
+    return any(math.dist(launch, other) < SAME for other in launches)
 
 
 def landed(path: Path, kind: str) -> list[Launch]:
@@ -144,11 +144,11 @@ def expect_apart(layout: Layout, band: str) -> None:
     Whatever uses either asks: neither needs to run anew because the other has changed.
     """
     path = layout.evidence / f"{band}.csv"
-    known = scores(layout, band)
-    if not (known and path.is_file()):
+    scored = scores(layout, band)
+    if not (scored and path.is_file()):
         return
     for launch in landed(path, "evidence"):
-        if among(launch, known):
+        if among(launch, scored):
             raise UserError(told_twice(launch, path, layout.measured / path.name))
 
 

@@ -56,13 +56,13 @@ class Layout:
         """
         folder = self.raw(band)
         split = {part.parent for part in folder.glob("*/*.mcap*") if part.parent.name[0] != "."}
-        found, old = sorted({*folder.glob("*.mcap"), *split}), folder.parent / f"{band}.mcap"
-        if not found and old.is_file():
+        numbered, old = sorted({*folder.glob("*.mcap"), *split}), folder.parent / f"{band}.mcap"
+        if not numbered and old.is_file():
             raise UserError(
                 f"{old}: the recordings of a band lie in a folder now:"
                 f" mkdir -p {folder} && mv {old} {folder}/"
             )
-        return found
+        return numbered
 
     def episodes(self, band: str) -> Path:
         """Folder of a band's episodes, a folder for each of its recorded pulls."""

@@ -38,7 +38,7 @@ def named(text: str, source: str) -> tuple[str, ...]:
     names = tuple(text.split(","))
     if names == ("cpu",):
         return names
-    if names != ("cuda",) and not all(re.fullmatch("cuda:(0|[1-9][0-9]*)", one) for one in names):
+    if names != ("cuda",) and not all(re.fullmatch("cuda:(0|[1-9][0-9]*)", name) for name in names):
         raise UserError(
             f"{source} must be cpu, cuda (all GPUs), cuda:0, or several such as cuda:0,cuda:2,"
             f" got {text!r}"
@@ -49,7 +49,7 @@ def named(text: str, source: str) -> tuple[str, ...]:
     if not there:
         raise UserError(f"{source} {text}: CUDA sees no GPU on this machine; take cpu")
     names = there if names == ("cuda",) else names
-    missing = ", ".join(one for one in names if one not in there)
+    missing = ", ".join(name for name in names if name not in there)
     if missing:
         raise UserError(f"{source} {text}: {missing} is not there; CUDA sees {', '.join(there)}")
     return names
@@ -60,7 +60,7 @@ def gpus() -> tuple[str, ...]:
     from pipeline.base.native import start, wp
 
     start()
-    return tuple(str(one) for one in wp.get_cuda_devices())
+    return tuple(str(device) for device in wp.get_cuda_devices())
 
 
 def workers() -> int | None:
@@ -101,9 +101,9 @@ def processor() -> str:
 
 def commit(folder: Path) -> str | None:
     """What Git calls the working copy that `folder` lies in; None where that is not known."""
-    about = ["git", "describe", "--always", "--dirty"]
+    command = ["git", "describe", "--always", "--dirty"]
     try:
-        git = subprocess.run(about, cwd=folder, capture_output=True, text=True, check=False)
+        git = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     except OSError:
         return None
     return git.stdout.strip() or None

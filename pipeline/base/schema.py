@@ -137,7 +137,7 @@ Pose = Annotated[  # x, y, z and the quaternion qx, qy, qz, qw
 def explained(error: ValidationError, model: type[Section]) -> str:
     """The first violation in words; a misspelt key comes before the key that it leaves missing."""
     errors = error.errors(include_url=False)
-    first = min(errors, key=lambda one: one["type"] != "extra_forbidden")
+    first = min(errors, key=lambda error_entry: error_entry["type"] != "extra_forbidden")
     kind, got = first["type"], _shown(first.get("input"))
     path = [str(part) for part in first["loc"] if part != "[key]"]
     if kind == "extra_forbidden":
@@ -168,9 +168,11 @@ def _closest(path: Sequence[str | int], model: type[Section]) -> str:
     kind: Any = model
     for part in path[:-1]:
         is_section = isinstance(kind, type) and issubclass(kind, BaseModel)
-        inner = [one for one in get_args(kind) if one is not Ellipsis]  # of a list, or a mapping
+        inner = [
+            argument for argument in get_args(kind) if argument is not Ellipsis
+        ]  # of a list, or a mapping
         kind = kind.model_fields[str(part)].annotation if is_section else inner[-1]
         if isinstance(kind, UnionType):  # a section, or null
             kind = get_args(kind)[0]
-    known = list(kind.model_fields)
-    return difflib.get_close_matches(str(path[-1]), known, n=1, cutoff=0)[0]
+    fields_of_kind = list(kind.model_fields)
+    return difflib.get_close_matches(str(path[-1]), fields_of_kind, n=1, cutoff=0)[0]

@@ -94,10 +94,10 @@ class Episode:
     @classmethod
     def load_all(cls, folder: Path) -> list[Episode]:
         """All pulls of a band, by the name of the recording, then by time. Raises as `load`."""
-        found = [cls.load(folder / "1")]
-        while (one := folder / str(len(found) + 1)).is_dir():
-            found.append(cls.load(one))
-        return found
+        episodes = [cls.load(folder / "1")]
+        while (numbered := folder / str(len(episodes) + 1)).is_dir():
+            episodes.append(cls.load(numbered))
+        return episodes
 
     @classmethod
     def load(cls, folder: Path) -> Episode:

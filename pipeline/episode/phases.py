@@ -88,17 +88,17 @@ class InteractionPhase:
 
 def phases(episode: Episode) -> list[InteractionPhase]:
     """All of an episode, by time; gaps are slack. None of them where the force never rises."""
-    found = phases_of_hand(episode)
-    if not found:
+    by_hand = phases_of_hand(episode)
+    if not by_hand:
         return []
-    drawn, release = found[-1].stop, float(episode.release_time)
+    drawn, release = by_hand[-1].stop, float(episode.release_time)
     recoil = np.flatnonzero(taut_frames(episode))
     after = episode.cloud_time > release
     after[recoil] = False
     over = float(min([release + LONGEST_RECOIL, *episode.cloud_time[after]]))
     end = float(max([episode.time[-1] + episode.sample_period / 2, *episode.cloud_time, over]))
     last = ("recoil", release, over, drawn, 0.0), ("swing", over, end, 0.0, 0.0)
-    return [*found, *(InteractionPhase(*one) for one in last)]
+    return [*by_hand, *(InteractionPhase(*fields) for fields in last)]
 
 
 def phases_of_hand(held: HandSignals) -> list[InteractionPhase]:
@@ -113,22 +113,24 @@ def phases_of_hand(held: HandSignals) -> list[InteractionPhase]:
     drawn = np.maximum(drawn, slack)
     names = _names(time, drawn, slack)
     ends = np.flatnonzero(np.diff(names)) + 1
-    found: list[InteractionPhase] = []
+    result: list[InteractionPhase] = []
     for first, last in zip([0, *ends], [*ends, len(time)], strict=True):
         until = last if last < len(time) else last - 1
         end = float(time[until]) if last < len(time) else float(held.release_time)
         if names[first] != SLACK:
-            one = InteractionPhase(
+            by_motion = InteractionPhase(
                 "", float(time[first]), end, float(drawn[first]), float(drawn[until])
             )
-            deepest = max([slack, *(phase.stop for phase in found)])
+            deepest = max([slack, *(phase.stop for phase in result)])
             part = slice(first, until + 1)
-            named = list(_named(one, names[first], time[part], drawn[part], deepest))
-            if not named and found and found[-1].end == one.begin:  # a jerk ends what it follows
-                last_one = found.pop()
-                named = [replace(last_one, end=one.end, stop=one.stop)]
-            found += named
-    return _joined(found)
+            named = list(_named(by_motion, names[first], time[part], drawn[part], deepest))
+            if (
+                not named and result and result[-1].end == by_motion.begin
+            ):  # a jerk ends what it follows
+                last_one = result.pop()
+                named = [replace(last_one, end=by_motion.end, stop=by_motion.stop)]
+            result += named
+    return _joined(result)
 
 
 SLACK, RESTS = -2, -1  # beside the numbers of ways
@@ -153,34 +155,34 @@ def _names(time: np.ndarray, drawn: np.ndarray, slack: float) -> np.ndarray:
 
 
 def _named(
-    one: InteractionPhase, name: int, time: np.ndarray, drawn: np.ndarray, deepest: float
+    phase: InteractionPhase, name: int, time: np.ndarray, drawn: np.ndarray, deepest: float
 ) -> Iterator[InteractionPhase]:
     """A run of samples as a phase, or as reloading and loading where it does both."""
     if name == RESTS:
-        yield InteractionPhase("pause", one.begin, one.end, one.start, one.stop)
-    elif one.way < TURN / 2:
+        yield InteractionPhase("pause", phase.begin, phase.end, phase.start, phase.stop)
+    elif phase.way < TURN / 2:
         return
-    elif one.stop < one.start:
-        yield InteractionPhase("unloading", one.begin, one.end, one.start, one.stop)
-    elif one.stop < deepest + TURN / 2:
-        yield InteractionPhase("reloading", one.begin, one.end, one.start, one.stop)
-    elif one.start > deepest - TURN / 2:
-        yield InteractionPhase("loading", one.begin, one.end, one.start, one.stop)
+    elif phase.stop < phase.start:
+        yield InteractionPhase("unloading", phase.begin, phase.end, phase.start, phase.stop)
+    elif phase.stop < deepest + TURN / 2:
+        yield InteractionPhase("reloading", phase.begin, phase.end, phase.start, phase.stop)
+    elif phase.start > deepest - TURN / 2:
+        yield InteractionPhase("loading", phase.begin, phase.end, phase.start, phase.stop)
     else:
         at = float(time[np.argmax(drawn >= deepest)])
-        yield InteractionPhase("reloading", one.begin, at, one.start, deepest)
-        yield InteractionPhase("loading", at, one.end, deepest, one.stop)
+        yield InteractionPhase("reloading", phase.begin, at, phase.start, deepest)
+        yield InteractionPhase("loading", at, phase.end, deepest, phase.stop)
 
 
-def _joined(found: list[InteractionPhase]) -> list[InteractionPhase]:
+def _joined(separate: list[InteractionPhase]) -> list[InteractionPhase]:
     """Pauses that only jerks part are one."""
     joined: list[InteractionPhase] = []
-    for one in found:
-        last = joined[-1] if joined else one
-        if joined and last.kind == one.kind == "pause":
-            joined[-1] = InteractionPhase("pause", last.begin, one.end, last.start, one.stop)
+    for phase in separate:
+        last = joined[-1] if joined else phase
+        if joined and last.kind == phase.kind == "pause":
+            joined[-1] = InteractionPhase("pause", last.begin, phase.end, last.start, phase.stop)
         else:
-            joined.append(one)
+            joined.append(phase)
     return joined
 
 
@@ -189,22 +191,22 @@ def turns(way: np.ndarray, least: float = TURN) -> list[int]:
 
     It grows at first.
     """
-    found, extreme, sign = [0], 0, 1.0
+    places, extreme, sign = [0], 0, 1.0
     for i, place in enumerate(way):
         further = sign * (place - way[extreme])
         if further >= 0:
             extreme = i
         elif -further > least:
-            found.append(extreme)
+            places.append(extreme)
             extreme, sign = i, -sign
-    return [*found, len(way) - 1]
+    return [*places, len(way) - 1]
 
 
-def unseen(found: Sequence[InteractionPhase]) -> dict[str, str]:
+def unseen(seen_phases: Sequence[InteractionPhase]) -> dict[str, str]:
     """What a recording with these phases lacks, and what therefore keeps its prior."""
-    moves = [one.speed for one in found if one.kind in MOVES and one.way >= LEAST_WAY]
-    back = any(one.kind == "unloading" and one.way >= BACK for one in found)
-    pauses = any(one.kind == "pause" and one.duration >= PAUSE for one in found)
+    moves = [phase.speed for phase in seen_phases if phase.kind in MOVES and phase.way >= LEAST_WAY]
+    back = any(phase.kind == "unloading" and phase.way >= BACK for phase in seen_phases)
+    pauses = any(phase.kind == "pause" and phase.duration >= PAUSE for phase in seen_phases)
     speeds = bool(moves) and max(moves) > OTHER_SPEED * min(moves)
     return {
         what: keeps

@@ -78,13 +78,13 @@ def planned_pull(
     legs = legs_of(dips, float(np.hypot(*draw)))
     shares = np.array([0.0, *(leg.share for leg in legs)])
     ways = np.diff(shares)
-    own = zip(legs, ways, strict=True)
-    times = [pull_time * way if leg.time is None else leg.time for leg, way in own]
+    legs_and_ways = zip(legs, ways, strict=True)
+    times = [pull_time * way if leg.time is None else leg.time for leg, way in legs_and_ways]
     ends = lifted + np.append(0.0, np.cumsum(times))
     release = ends[-1] + pause
     end = release + params.tail + SPARE
     time = period * (np.arange(int(end / period)) + 0.5)
-    start, below, there = (np.array(one) for one in ([0, 0, hanging], [0, 0, 0], [0, *draw]))
+    start, below, there = (np.array(place) for place in ([0, 0, hanging], [0, 0, 0], [0, *draw]))
     position = start + np.outer(_eased(time, grasp + GRASP_TIME, lifted), below - start)
     for way, begin, until in zip(ways, ends[:-1], ends[1:], strict=True):
         position += np.outer(_eased(time, begin, until), way * there)

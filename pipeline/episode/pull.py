@@ -62,7 +62,9 @@ def _from_fork(first: float, time: np.ndarray, way: np.ndarray, bends: list[int]
 def deepest_draw(episodes: Iterable[Episode]) -> float:
     """How far from the fork hands held a band at most [m]."""
     held = [
-        one.position[(one.time >= one.grasp_time) & (one.time <= one.release_time)]
-        for one in episodes
+        episode.position[
+            (episode.time >= episode.grasp_time) & (episode.time <= episode.release_time)
+        ]
+        for episode in episodes
     ]
     return float(np.linalg.norm(np.concatenate(held), axis=1).max())

@@ -31,7 +31,7 @@ class Window:
 
 
 def window_of(
-    about: EpisodeParams, first: float, grasp: float, release: float, margin: float = 0.0
+    episode_params: EpisodeParams, first: float, grasp: float, release: float, margin: float = 0.0
 ) -> Window:
     """Of `episode.duration` where grasp, release and tail fit into it, else longer.
 
@@ -46,22 +46,22 @@ def window_of(
     Raises:
         UserError: It would be longer than `episode.longest`, or the grasp was not recorded.
     """
-    start = max(first, release + about.tail - about.duration)
+    start = max(first, release + episode_params.tail - episode_params.duration)
     if start <= grasp - margin:
-        return Window(start, about.duration, about.samples)
+        return Window(start, episode_params.duration, episode_params.samples)
     if first > grasp - margin:
         raise UserError(
             f"the recording begins at {first:.2f} s, too late for the grasp at {grasp:.2f} s:"
             " record from before it on"
         )
-    period, end = about.duration / about.samples, release + about.tail
-    most = int(about.longest / period + ROUNDING)
+    period, end = episode_params.duration / episode_params.samples, release + episode_params.tail
+    most = int(episode_params.longest / period + ROUNDING)
     samples = min(math.ceil((end - max(first, grasp - LEAD)) / period - ROUNDING), most)
     start = max(first, end - samples * period)
     if start > grasp - margin:
         raise UserError(
             f"from grasp to release it takes {release - grasp:.2f} s, more than episode.longest"
-            f" {about.longest:g} s less episode.tail {about.tail:g} s: pull faster, with fewer"
-            " cycles or a shorter pause, or raise episode.longest in params.yaml"
+            f" {episode_params.longest:g} s less episode.tail {episode_params.tail:g} s: pull faster,"
+            " with fewer cycles or a shorter pause, or raise episode.longest in params.yaml"
         )
     return Window(start, samples * period, samples)

@@ -112,7 +112,7 @@ def calibrate_clamps(
     solid = young * np.pi * sling.radius**4 / 4
     part = slack_part(episode)
     loss = EpisodeLoss.plain(params, part, sling)
-    one = Parameters.of(sling.law, np.array([young, POISSON, 5e-3, 1.0, 1.0]))
+    unit_parameters = Parameters.of(sling.law, np.array([young, POISSON, 5e-3, 1.0, 1.0]))
     held_fast = replace(sling, grip_force=1e6)
 
     def direction(angle: float) -> np.ndarray:
@@ -122,7 +122,9 @@ def calibrate_clamps(
     def losses(angle: float, rigidity: np.ndarray) -> np.ndarray:
         """One angle with several rigidities, which share a batch, shape (len(rigidity),)."""
         trial = replace(held_fast, clamp_direction=direction(angle))
-        rollouts = interact(trial, part, one.spread(len(rigidity)), rigidity=solid * rigidity)
+        rollouts = interact(
+            trial, part, unit_parameters.spread(len(rigidity)), rigidity=solid * rigidity
+        )
         terms = loss.terms(rollouts)
         total = sum(terms[name] / unit for name, unit in UNITS.items())
         return np.where([reason is None for reason in rollouts.failure], total, np.inf)
@@ -134,16 +136,16 @@ def calibrate_clamps(
         return float(table[i, j]), float(angles[i]), float(rigidity[j])
 
     start = float(losses(0.0, np.array([1.0]))[0])
-    found = best(np.linspace(*ANGLE, 10), np.geomspace(*RIGIDITY, 16))
+    coarse = best(np.linspace(*ANGLE, 10), np.geomspace(*RIGIDITY, 16))
     for width in (1.0, 0.3):  # around the best, ten degrees and half a decade on each side
-        found = min(
-            found,
+        coarse = min(
+            coarse,
             best(
-                found[1] + width * np.linspace(-9, 9, 7),
-                found[2] * np.geomspace(3**-width, 3**width, 16),
+                coarse[1] + width * np.linspace(-9, 9, 7),
+                coarse[2] * np.geomspace(3**-width, 3**width, 16),
             ),
         )
-    value, angle, rigidity = min(found, (start, 0.0, 1.0))
+    value, angle, rigidity = min(coarse, (start, 0.0, 1.0))
     if not np.isfinite(value):
         raise UserError(
             f"episode of {episode.band}: no simulation of its slack part converges; check"

@@ -69,14 +69,14 @@ class Params(Section):
 
     @model_validator(mode="after")
     def _names_agree(self) -> Params:
-        for key, names, known in (
+        for key, names, defined in (
             ("bands", self.run.bands, self.bands),
             ("own", self.run.own, self.bands),
             ("dips", self.run.dips, self.bands),
             ("methods", self.run.methods, self.methods),
             ("ablations.methods", self.run.ablations.methods, self.methods),
         ):
-            _expect_all(names, known, f"run.{key}")
+            _expect_all(names, defined, f"run.{key}")
         for band in self.run.ablations.bands:
             if band not in self.run.bands:
                 raise refusal(f"run.ablations.bands: {band} is not one of run.bands")
@@ -179,18 +179,18 @@ class Params(Section):
         return self
 
 
-def _expect_all(names: Iterable[str], known: Collection[str], key: str) -> None:
+def _expect_all(names: Iterable[str], defined: Collection[str], key: str) -> None:
     for name in names:
-        if name not in known:
-            raise refusal(f"{key}: {name} is not one of {', '.join(known)}")
+        if name not in defined:
+            raise refusal(f"{key}: {name} is not one of {', '.join(defined)}")
 
 
 def expect_known(params: Params, kind: str, name: str, called: str | None = None) -> None:
     """Raises UserError where there is no such `kind`, band or method; `called` names it."""
-    known = getattr(params, f"{kind}s")
-    if name not in known:
+    defined = getattr(params, f"{kind}s")
+    if name not in defined:
         raise UserError(
-            f"{called or kind} {name}: not in params.yaml, which has {', '.join(known)}"
+            f"{called or kind} {name}: not in params.yaml, which has {', '.join(defined)}"
         )
 
 

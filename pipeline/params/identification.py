@@ -239,14 +239,16 @@ def parameter_names(law: str) -> tuple[str, ...]:
     return (*ParameterBoxes.model_fields, *LAWS[law])
 
 
-def methods_by_step(methods: Iterable[str], known: Mapping[str, MethodParams]) -> dict[str, list]:
+def methods_by_step(
+    methods: Iterable[str], methods_params: Mapping[str, MethodParams]
+) -> dict[str, list]:
     """What `run.steps` must hold for `methods`, each of which is in `known`."""
-    found: dict[str, list] = {step: [] for step in StepParams.model_fields}
+    by_step: dict[str, list] = {step: [] for step in StepParams.model_fields}
     for name in methods:
-        for step in steps_of(known[name].search):
-            if step in found:  # `cma` has the list of `clusters`
-                found[step].append(name)
-    return found
+        for step in steps_of(methods_params[name].search):
+            if step in by_step:  # `cma` has the list of `clusters`
+                by_step[step].append(name)
+    return by_step
 
 
 def steps_of(search: str) -> tuple[str, ...]:

@@ -43,40 +43,42 @@ def settings_of(params: Params, band: str, method: str) -> dict[str, Any]:
     But for those of launches that are evidence: `evidence_settings_of`. Values are those of JSON:
     numbers, texts, lists, None.
     """
-    found = flat(f"bands.{band}", params.bands[band])
+    settings = flat(f"bands.{band}", params.bands[band])
     for name in RECORDING:
-        found.update(flat(name, getattr(params, name)))
-    found.update(_part(params, "setup", *RECORDED_SETUP, *PULL_SETUP))
-    found.update(_part(params, "sling", *MESH, *PULL_STEPS))
-    found.update(flat("loss", params.loss))
-    found.update(flat("parameters", params.parameters))
+        settings.update(flat(name, getattr(params, name)))
+    settings.update(_part(params, "setup", *RECORDED_SETUP, *PULL_SETUP))
+    settings.update(_part(params, "sling", *MESH, *PULL_STEPS))
+    settings.update(flat("loss", params.loss))
+    settings.update(flat("parameters", params.parameters))
     for name in METHOD:
-        found.update(flat(f"methods.{method}.{name}", getattr(params.methods[method], name)))
-    return found
+        settings.update(flat(f"methods.{method}.{name}", getattr(params.methods[method], name)))
+    return settings
 
 
 def evidence_settings_of(params: Params) -> dict[str, Any]:
     """The settings that launches as evidence rest on, as `settings_of` gives them."""
-    found = _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
-    return found | {"trials.actuation_error": params.trials.actuation_error}
+    settings = _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
+    return settings | {"trials.actuation_error": params.trials.actuation_error}
 
 
 def policy_settings_of(params: Params, band: str) -> dict[str, Any]:
     """The settings that a policy rests on beside its θ, as `settings_of` gives them."""
-    found = flat(f"bands.{band}", params.bands[band])
-    found.update(_launch_settings(params))
-    found.update(_part(params, "setup", *PULL_SETUP, *POLICY_SETUP))
-    found.update(_part(params, "sling", *MESH))
-    found.update(flat("policy", params.policy))
-    return found
+    settings = flat(f"bands.{band}", params.bands[band])
+    settings.update(_launch_settings(params))
+    settings.update(_part(params, "setup", *PULL_SETUP, *POLICY_SETUP))
+    settings.update(_part(params, "sling", *MESH))
+    settings.update(flat("policy", params.policy))
+    return settings
 
 
 def changes(then: Mapping[str, Any], now: Mapping[str, Any]) -> list[Change]:
     """What differs between two sets of settings, sorted by key."""
-    found = (
+    compared = (
         Change(key, then.get(key, NOT_THERE), now.get(key, NOT_THERE)) for key in {*then, *now}
     )
-    return sorted((one for one in found if one.old != one.new), key=lambda one: one.key)
+    return sorted(
+        (change for change in compared if change.old != change.new), key=lambda change: change.key
+    )
 
 
 def changed_since(params: Params, content: Mapping[str, Any], method: str) -> list[Change]:
@@ -91,8 +93,8 @@ def changed_since(params: Params, content: Mapping[str, Any], method: str) -> li
 
 
 def _launch_settings(params: Params) -> dict[str, Any]:
-    found = _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
-    return found | flat("launch", params.launch)
+    settings = _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
+    return settings | flat("launch", params.launch)
 
 
 def _part(params: Params, section: str, *names: str) -> dict[str, Any]:

@@ -84,12 +84,14 @@ class RigBand(Section):
     def _the_law_has_its_constants(self) -> RigBand:
         given = self.constants
         if self.law == "ogden":
-            pairs = [one * other for one, other in zip(given[::2], given[1::2], strict=False)]
+            pairs = [factor * other for factor, other in zip(given[::2], given[1::2], strict=False)]
             if len(given) % 2 or not all(product > 0 for product in pairs):
                 raise refusal("constants: ogden has pairs of modulus and exponent of one sign")
             return self
         limits = LAWS[self.law]
-        inside = (low <= one <= high for one, (low, high) in zip(given, limits, strict=False))
+        inside = (
+            low <= constant <= high for constant, (low, high) in zip(given, limits, strict=False)
+        )
         if given and not (len(given) == len(limits) and all(inside)):
             ranges = ", ".join(f"{low:g} to {high:g}" for low, high in limits)
             raise refusal(f"constants: {self.law} has [{ranges}], got {list(given)}")

@@ -115,7 +115,7 @@ def rewarded(
 
 def draw_box(surface: Source) -> tuple[torch.Tensor, torch.Tensor]:
     """Centre and half size of the box of draws [m], each of shape (2,)."""
-    low, high = (torch.tensor(one, dtype=torch.float32) for one in (surface.low, surface.high))
+    low, high = (torch.tensor(end, dtype=torch.float32) for end in (surface.low, surface.high))
     return (low + high) / 2, (high - low) / 2
 
 

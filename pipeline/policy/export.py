@@ -33,7 +33,7 @@ USED = ("sling2sim2real", "torch", "rsl-rl-lib", "onnx", "numpy")
 
 
 def export(
-    trained: Trained, folder: Path, params: Params, band: str, method: str, theta: dict, **about
+    trained: Trained, folder: Path, params: Params, band: str, method: str, theta: dict, **more
 ) -> None:
     """Write a policy's files into `folder`: networks and curve, and last its card.
 
@@ -44,7 +44,7 @@ def export(
         pq.write_table(pa.table(trained.curve), temporary)
     write_onnx(trained.policy, folder / "policy.onnx")
     write_torchscript(trained.policy, folder / "policy.pt")
-    content = card(trained.policy, params, band, method, theta, **about)
+    content = card(trained.policy, params, band, method, theta, **more)
     write_json(folder / "card.json", content)
 
 
@@ -147,7 +147,7 @@ def card(
     """
     center, half = policy.draw_center, policy.draw_half
     low, high = (np.round((center + sign * half).tolist(), 6).tolist() for sign in (-1, 1))
-    setup, about = params.setup, params.bands[band]
+    setup, band_params = params.setup, params.bands[band]
     return {
         "band": band,
         "method": method,
@@ -180,9 +180,9 @@ def card(
             "fork_height_m": setup.fork_height,
             "projectile_mass_kg": setup.projectile_mass,
             "arm_stiffness_n_m": setup.arm_stiffness,
-            "band_mass_kg": about.mass,
-            "band_diameter_m": about.diameter,
-            "band_rest_length_m": about.rest_length,
+            "band_mass_kg": band_params.mass,
+            "band_diameter_m": band_params.diameter,
+            "band_rest_length_m": band_params.rest_length,
         },
         "training": _strict(training),
         "landing_map": landing_map,
@@ -195,7 +195,7 @@ def _projectile(policy: Policy) -> dict:
     """Of the card: the input that a policy has which sees the projectile."""
     if not isinstance(policy, ProjectilePolicy):
         return {}
-    about = {
+    content = {
         "name": PROJECTILE,
         "unit": "m",
         "shape": ["batch", 2],
@@ -204,13 +204,13 @@ def _projectile(policy: Policy) -> dict:
         "frame": FRAME,
         "trained_at": np.round(policy.projectile.tolist(), 6).tolist(),  # there alone
     }
-    return {PROJECTILE: about}
+    return {PROJECTILE: content}
 
 
 def _strict(value: object) -> object:
     """As strict JSON has it: no NaN, no numbers of NumPy's."""
     if isinstance(value, dict):
-        return {name: _strict(one) for name, one in value.items()}
+        return {name: _strict(entry) for name, entry in value.items()}
     if isinstance(value, float | np.floating):
         return float(value) if np.isfinite(value) else None
     return value.item() if isinstance(value, np.generic) else value

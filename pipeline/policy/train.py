@@ -196,8 +196,8 @@ class _Training:
             self.log_std = np.append(schedule, last)  # of each iteration, and after the last
         network = runner.alg.get_policy()
         self.distribution: Any = network.distribution
-        about = network.mlp, env.targets, env.surface
-        self.policy = Policy(*about) if projectile is None else ProjectilePolicy(*about, projectile)
+        sizes = network.mlp, env.targets, env.surface
+        self.policy = Policy(*sizes) if projectile is None else ProjectilePolicy(*sizes, projectile)
         self.checked = np.linspace(*env.targets, CHECKED_TARGETS)
         self.rewards: list[float] = []
         self.rows: list[dict] = []

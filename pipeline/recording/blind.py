@@ -73,7 +73,7 @@ def _factor(view: View, swapped: bool) -> float | None:
     factor = float(np.median(seen))
     if np.median(np.abs(seen / factor - 1)) > ALIKE:
         return None
-    near = min((1.0, *UNITS), key=lambda one: abs(np.log(factor / one)))
+    near = min((1.0, *UNITS), key=lambda unit: abs(np.log(factor / unit)))
     return near if 1 / FITS < factor / near < FITS else float(f"{factor:.2g}")
 
 

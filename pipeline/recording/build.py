@@ -31,12 +31,12 @@ class Checked(Processed):
     @property
     def cautions(self) -> list[Finding]:
         """What costs accuracy, and not the recording."""
-        return [one for one in self.findings if not one.refused]
+        return [finding for finding in self.findings if not finding.refused]
 
     @property
     def refusal(self) -> Finding | None:
         """Why the pull cannot be used."""
-        return next((one for one in self.findings if one.refused), None)
+        return next((finding for finding in self.findings if finding.refused), None)
 
 
 def process(path: Path, band: BandParams, params: Params) -> Checked:
@@ -118,7 +118,7 @@ def episode_of(done: Checked, band_name: str, params: Params) -> Episode:
             "losses": recording.losses,
             "notes": recording.notes,
         },
-        "cautions": [one.content() for one in done.cautions],
+        "cautions": [caution.content() for caution in done.cautions],
         "geometry": EpisodeGeometry.of(recording, geometry).content(),
         "preprocessing": {
             **asdict(signals.facts),

@@ -62,10 +62,10 @@ def camera_delay(pull: Pull) -> tuple[float, float] | None:
             for turn, hand, seen in zip(turns, hands, pictures, strict=True)
         ]
         first = np.arange(len(at)) < len(at) / 2
-        found = [_step(points, turns, hands, speed, part) for part in (first, ~first)]
-        if None in found:
+        halves = [_step(points, turns, hands, speed, part) for part in (first, ~first)]
+        if None in halves:
             return None
-        steps, errors = np.array(found).T
+        steps, errors = np.array(halves).T
         delay += float(steps.mean())
         if abs(delay) > LONGEST:
             return None

@@ -62,9 +62,9 @@ def clouds_of(view: View, cloud: CloudParams) -> Clouds:
     def of_frame(number: int) -> list[tuple[float, np.ndarray, int]]:
         """Nothing of a damaged frame."""
         return [
-            (frame.time, cloud_of(view, frame, found, cloud), int(found.sum()))
+            (frame.time, cloud_of(view, frame, of_band, cloud), int(of_band.sum()))
             for _, frame in view.frames([number])
-            for found in [mask.mask(frame)]
+            for of_band in [mask.mask(frame)]
         ]
 
     with ThreadPoolExecutor(cores()) as pool:
@@ -91,13 +91,13 @@ def clouds_of(view: View, cloud: CloudParams) -> Clouds:
     return clouds
 
 
-def cloud_of(view: View, frame: Frame, found: np.ndarray, cloud: CloudParams) -> np.ndarray:
+def cloud_of(view: View, frame: Frame, mask: np.ndarray, cloud: CloudParams) -> np.ndarray:
     """Points of the pixels `found` (H, W), without outliers and sampled, (P, 3) float32."""
-    if not found.any():
+    if not mask.any():
         return np.zeros((0, 3), np.float32)
     matrix = view.recording.depth_camera.matrix
-    per_square = matrix[0, 0] * matrix[1, 1] / float(np.median(frame.depth[found])) ** 2
-    return sample(frame.points[found], cloud, view.scene.diameter * per_square)
+    per_square = matrix[0, 0] * matrix[1, 1] / float(np.median(frame.depth[mask])) ** 2
+    return sample(frame.points[mask], cloud, view.scene.diameter * per_square)
 
 
 def sample(points: np.ndarray, cloud: CloudParams, density: float = np.inf) -> np.ndarray:

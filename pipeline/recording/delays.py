@@ -134,24 +134,24 @@ def correct_delays(pull: Pull, params: Params) -> tuple[Pull, Delays]:
         sure = abs(left) > SIGMAS * max(inertia.delay_error, LEAST_ERROR)
         inertia = replace(inertia, delay=left if sure else 0.0)
     camera = Estimate.unseen(given.camera, GIVEN_CAMERA, UNSEEN_CAMERA)
-    found = _by_hand(pull, params.setup.fork_width)
-    if found is not None:
-        camera = Estimate.seen(*found, against="pose", given=given.camera)
+    by_hand = _by_hand(pull, params.setup.fork_width)
+    if by_hand is not None:
+        camera = Estimate.seen(*by_hand, against="pose", given=given.camera)
     pull = _put_right(pull, camera=camera.rest)
     release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
-    allowed = 0.0 if found is None else SIGMAS * (camera.error or 0.0)
+    allowed = 0.0 if by_hand is None else SIGMAS * (camera.error or 0.0)
     if pose.alone and release is not None:
-        own = _by_itself(pose.rest, found and found[0], camera.rest, release, allowed)
-        pose = replace(pose, alone=own is None)
-        if own and found is not None:
+        by_itself = _by_itself(pose.rest, by_hand and by_hand[0], camera.rest, release, allowed)
+        pose = replace(pose, alone=by_itself is None)
+        if by_itself and by_hand is not None:
             pull = _put_right(pull, -pose.rest, -camera.rest)
-            rest = found[0] - pose.rest
-            camera = Estimate.seen(rest, found[1], against="pose", given=given.camera)
+            rest = by_hand[0] - pose.rest
+            camera = Estimate.seen(rest, by_hand[1], against="pose", given=given.camera)
             pose = Estimate(left=UNSEEN_POSE)
             pull = _put_right(pull, camera=camera.rest)
             release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
     if release is not None and release.beyond > allowed:
-        if found is not None:
+        if by_hand is not None:
             after = f"{1e3 * release.middle:+.0f} ± {1e3 * release.error:.0f} ms"
             conflict = conflict or (
                 f"the hand in the pictures goes with the pose, but the band is let go {after} after"
@@ -160,7 +160,7 @@ def correct_delays(pull: Pull, params: Params) -> tuple[Pull, Delays]:
         pull = _put_right(pull, camera=release.middle)
         value, error = (given.camera or 0.0) + camera.rest + release.middle, release.error
         camera = Estimate(value, error, "estimated", True, error, given=given.camera)
-    elif release is not None and found is None:
+    elif release is not None and by_hand is None:
         left = float(np.hypot(release.middle, release.error))
         camera = replace(camera, left=left if given.camera is None else min(left, GIVEN_CAMERA))
     return pull, Delays(pose, camera, inertia, release, conflict)
@@ -170,8 +170,8 @@ def _by_hand(pull: Pull, fork_width: float) -> tuple[float, float] | None:
     """The camera's delay against the pose and its standard error [s]; None where nothing tells."""
     release = _or_none(lambda: release_pictures(pull, fork_width))
     near = release.middle if release is not None and release.beyond else 0.0
-    found = _or_none(lambda: camera_delay(_put_right(pull, camera=near)))
-    return (near + found[0], found[1]) if found and found[1] <= MOST_ERROR else None
+    matched = _or_none(lambda: camera_delay(_put_right(pull, camera=near)))
+    return (near + matched[0], matched[1]) if matched and matched[1] <= MOST_ERROR else None
 
 
 def _put_right(pull: Pull, pose: float = 0.0, camera: float = 0.0) -> Pull:
@@ -194,29 +194,29 @@ def _by_itself(
         return None
     if camera is None:  # a force's clock that is off explains both
         return False if release.beyond and not release.off(late) else None
-    clock, own = (release.off(camera - taken - one) <= allowed for one in (0.0, late))
-    return own if own != clock else None
+    clock, itself = (release.off(camera - taken - shift) <= allowed for shift in (0.0, late))
+    return itself if itself != clock else None
 
 
 def _of_pose(pull: Pull, inertia: ToolInertia | None, given: float | None) -> tuple[Estimate, str]:
     """The pose's delay, and the conflict of the two that tell it."""
-    found = []
+    estimates = []
     if inertia is not None and max(inertia.delay_error, LEAST_ERROR) <= MOST_ERROR:
-        found.append((inertia.delay, max(inertia.delay_error, LEAST_ERROR)))
+        estimates.append((inertia.delay, max(inertia.delay_error, LEAST_ERROR)))
     back = _or_none(lambda: start_back(pull))
     if back is not None and abs(back[0]) < AT_ONCE and back[1] <= MOST_ERROR:
-        found.append(back)
-    if not found:
+        estimates.append(back)
+    if not estimates:
         return Estimate.unseen(given, GIVEN_POSE, UNSEEN_POSE), ""
-    if len(found) == 2:
-        (one, its), (other, others) = found
-        if abs(one - other) > SIGMAS * np.linalg.norm([its, others, pull.release.error]):
+    if len(estimates) == 2:
+        (first, its), (other, others) = estimates
+        if abs(first - other) > SIGMAS * np.linalg.norm([its, others, pull.release.error]):
             words = (
-                f"the pose is {1e3 * one:+.1f} ± {1e3 * its:.1f} ms late by the tool's inertia, but"
-                f" {1e3 * other:+.1f} ± {1e3 * others:.1f} ms by the hand that starts back"
+                f"the pose is {1e3 * first:+.1f} ± {1e3 * its:.1f} ms late by the tool's inertia,"
+                f" but {1e3 * other:+.1f} ± {1e3 * others:.1f} ms by the hand that starts back"
             )
-            return Estimate.seen(one, its, given=given), words
-    elif given is not None and back is not None and back in found:
+            return Estimate.seen(first, its, given=given), words
+    elif given is not None and back is not None and back in estimates:
         if abs(back[0]) > SIGMAS * np.hypot(back[1], GIVEN_POSE):
             words = (
                 f"with episode.delays.pose {given:g} s the hand starts back"
@@ -224,11 +224,11 @@ def _of_pose(pull: Pull, inertia: ToolInertia | None, given: float | None) -> tu
                 " itself, or that delay is wrong"
             )
             return Estimate.unseen(given, GIVEN_POSE, UNSEEN_POSE), words
-    weights = np.array([error**-2.0 for _, error in found])
-    value = float(weights @ [value for value, _ in found] / weights.sum())
-    error, against = float(weights.sum() ** -0.5), "release" if back in found else "force"
+    weights = np.array([error**-2.0 for _, error in estimates])
+    value = float(weights @ [value for value, _ in estimates] / weights.sum())
+    error, against = float(weights.sum() ** -0.5), "release" if back in estimates else "force"
     estimate = Estimate.seen(value, error, against, given)
-    alone = found == [back] and abs(value) > SIGMAS * error and given is None
+    alone = estimates == [back] and abs(value) > SIGMAS * error and given is None
     return replace(estimate, alone=alone), ""
 
 

@@ -69,7 +69,7 @@ def find_releases(t: np.ndarray, force: np.ndarray, gripper: Opening | None) -> 
     With a gripper they end where the fingers open, and where a band slips out that was grasped for
     this pull, if it is grasped anew for the next one. Arguments are those of `find_release`.
     """
-    found: list[float] = []
+    releases: list[float] = []
     try:
         _, free, ends, _ = _drops(t, force, *reach(t), gripper)
     except UserError:
@@ -78,12 +78,12 @@ def find_releases(t: np.ndarray, force: np.ndarray, gripper: Opening | None) -> 
         if gripper is not None and i not in ends:
             moments = (float(t[k]) for k in (i, i if later is None else later))
             grasp, again = (_closed(*gripper, moment) for moment in moments)
-            if grasp is None or (found and grasp < found[-1]):
+            if grasp is None or (releases and grasp < releases[-1]):
                 continue
             if later is not None and (again is None or again < t[i]):
                 continue
-        found.append(float(t[i]))
-    return found
+        releases.append(float(t[i]))
+    return releases
 
 
 def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = None) -> Release:

@@ -108,28 +108,28 @@ def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
         if given is not None:
             sources[name] = f"setup.{name}"
             return Transform.of(given).inverse()
-        found = tree.between(FORK, frame)
-        if found is not None:
+        transform = tree.between(FORK, frame)
+        if transform is not None:
             sources[name] = f"/tf_static {FORK} <- {frame}"
-        return found
+        return transform
 
-    known = (
+    transforms = (
         to_fork("base_to_fork", pose_frame, setup.base_to_fork),
         to_fork("camera_to_fork", color_frame, setup.camera_to_fork),
     )
     named = pose_frame and color_frame
     between = tree.between(pose_frame, color_frame) if named else None
-    base, color_to_fork = third(*known, between)
+    base, color_to_fork = third(*transforms, between)
     if base is None:
         raise _missing(recording, "base_to_fork", pose_frame, color_frame)
     if color_to_fork is None:
         raise _missing(recording, "camera_to_fork", color_frame, pose_frame)
     join, loop = f"/tf_static {pose_frame} <- {color_frame}", None
-    if known[0] is None:
+    if transforms[0] is None:
         sources["base_to_fork"] = f"{sources['camera_to_fork']}, and {join}"
-    elif known[1] is None:
+    elif transforms[1] is None:
         sources["camera_to_fork"] = f"{sources['base_to_fork']}, and {join}"
-    elif between is not None and any(one.startswith("setup") for one in sources.values()):
+    elif between is not None and any(source.startswith("setup") for source in sources.values()):
         poses = base.inverse(), color_to_fork.inverse(), between
         loop = Loop.of(*poses, setup.fork_width)
         sources["loop"] = str(loop)
@@ -165,13 +165,13 @@ def _between_cameras(recording: Recording, color_frame: str, depth_frame: str) -
     """Depth camera to colour camera; identity where the depth is registered to colour."""
     if color_frame == depth_frame:
         return Transform.identity()
-    found = recording.transforms.between(color_frame, depth_frame)
-    if found is None:
+    transform = recording.transforms.between(color_frame, depth_frame)
+    if transform is None:
         raise UserError(
             f"{recording.path}: depth is in frame {depth_frame!r}, colour in {color_frame!r}, and"
             " /tf_static does not join the two: publish it, or record depth registered to colour"
         )
-    return found
+    return transform
 
 
 def _tool_frame(tree: TransformTree, wrench_frame: str, tip_link: str | None) -> str:

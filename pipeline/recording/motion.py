@@ -96,9 +96,9 @@ class Motion:
             make_lsq_spline(self.time, path, knots, DEGREE).derivative(2)(times)
             for knots in _knots(self.time, self.period, jump)
         ]
-        found = np.mean(splines, axis=0)
-        found[(times < self.time[0]) | (times > self.time[-1])] = 0.0
-        return found
+        mean = np.mean(splines, axis=0)
+        mean[(times < self.time[0]) | (times > self.time[-1])] = 0.0
+        return mean
 
 
 def _knots(t: np.ndarray, period: float, jump: float | None) -> Iterator[np.ndarray]:

@@ -93,11 +93,13 @@ class Pull:
 
     @cached_property
     def release(self) -> Release:
-        found = find_release(self.force_time, self.force, self.opening)
+        found_release = find_release(self.force_time, self.force, self.opening)
         bursts = self.recording.wrench.bursts
         if bursts:
-            found = replace(found, error=float(np.hypot(found.error, 1e-9 * bursts.error)))
-        return found
+            found_release = replace(
+                found_release, error=float(np.hypot(found_release.error, 1e-9 * bursts.error))
+            )
+        return found_release
 
     @cached_property
     def releases(self) -> list[float]:

@@ -144,11 +144,11 @@ def _points(
     window = slice(low[1], high[1]), slice(low[0], high[0])
     depth = depth[window]
     points = pose.apply((rays[window] * depth[..., None])[depth > 0].astype(float))
-    found = np.zeros(len(points), bool)
+    chosen = np.zeros(len(points), bool)
     for tip in tips:
         length = np.linalg.norm(hand - tip)
         way, from_tip = (hand - tip) / length, points - tip
         along = from_tip @ way
         off = np.linalg.norm(from_tip - along[:, None] * way, axis=1)
-        found |= (off < NEAR) & (along > OUTER * length) & (along < length - HAND)
-    return int(found.sum())
+        chosen |= (off < NEAR) & (along > OUTER * length) & (along < length - HAND)
+    return int(chosen.sum())

@@ -54,10 +54,10 @@ def flat_top(pull: Pull) -> FlatTop | None:
     if not flat.any():
         return None
     axis = int(np.argmax(flat.sum(axis=0)))
-    found = np.flatnonzero(flat[:, axis])
-    begin, end = t[found[0] * count], t[(found[-1] + 1) * count - 1]
-    value = float(np.median(parts[found, :, axis]))
-    frozen = bool(np.all(change[found] == 0))
+    flat_samples = np.flatnonzero(flat[:, axis])
+    begin, end = t[flat_samples[0] * count], t[(flat_samples[-1] + 1) * count - 1]
+    value = float(np.median(parts[flat_samples, :, axis]))
+    frozen = bool(np.all(change[flat_samples] == 0))
     return FlatTop(axis, value, float(begin), float(end), frozen)
 
 

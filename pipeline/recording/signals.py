@@ -236,7 +236,7 @@ def _window(pull: Pull, episode: EpisodeParams) -> Window:
 
 def _gaps(pull: Pull, start: float, end: float) -> dict[str, float]:
     """Longest time without a message in the window [s], by topic: values are interpolated."""
-    found = {}
+    gaps = {}
     for stream in (pull.recording.wrench, pull.recording.pose):
         times = stream.seconds(pull.recording.origin)
         inside = times[(times > start) & (times < end)]
@@ -246,8 +246,8 @@ def _gaps(pull: Pull, start: float, end: float) -> dict[str, float]:
                 f"{stream.topic} is missing for {gap:.2f} s between the lead-in and the end: more"
                 f" than {MOST_GAP:g} s cannot be filled in, record again"
             )
-        found[stream.topic] = gap
-    return found
+        gaps[stream.topic] = gap
+    return gaps
 
 
 def _lets_back(motion: Motion, time: float) -> bool:

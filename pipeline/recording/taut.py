@@ -186,17 +186,17 @@ def _aside(samples: Samples, state: np.ndarray) -> tuple[np.ndarray, np.ndarray,
 
     def slope(normal: np.ndarray, radii: float) -> np.ndarray:
         """Derivative of `away` along `normal` less so many radii, (P, 15)."""
-        found = np.empty((len(points), len(PRIOR_MEAN)))
-        found[:, SHIFT] = normal
-        found[:, TURN] = np.cross(points - state[SHIFT], normal)
-        found[:, HAND] = -normal * share
-        found[:, WEIGHT] = normal[:, 2] * sag
-        found[:, RADIUS] = -radii
-        found[:, PADS] = np.einsum("pi,pi->p", found[:, HAND], side)
-        found[:, STIFFNESS] = -np.einsum("pi,pi->p", normal, bend)
-        found[:, TILT] = -np.einsum("pi,pi->p", normal, tilted)
-        found[:, INWARDS] = np.einsum("pi,pi->p", normal, side * (1 - share))
-        return found
+        slopes = np.empty((len(points), len(PRIOR_MEAN)))
+        slopes[:, SHIFT] = normal
+        slopes[:, TURN] = np.cross(points - state[SHIFT], normal)
+        slopes[:, HAND] = -normal * share
+        slopes[:, WEIGHT] = normal[:, 2] * sag
+        slopes[:, RADIUS] = -radii
+        slopes[:, PADS] = np.einsum("pi,pi->p", slopes[:, HAND], side)
+        slopes[:, STIFFNESS] = -np.einsum("pi,pi->p", normal, bend)
+        slopes[:, TILT] = -np.einsum("pi,pi->p", normal, tilted)
+        slopes[:, INWARDS] = np.einsum("pi,pi->p", normal, side * (1 - share))
+        return slopes
 
     return away, way, slope
 

@@ -153,7 +153,8 @@ def measure_tips(
         """What would be off if the camera saw by so much more."""
         sight = samples.points.mean(axis=0) - eye
         points, hanging = (
-            _seen_by(kind, factor, one, eye, sight) for one in (samples.points, samples.hanging)
+            _seen_by(kind, factor, sampled, eye, sight)
+            for sampled in (samples.points, samples.hanging)
         )
         return _of_samples(scene, replace(samples, points=points, hanging=hanging), eye)
 
@@ -184,7 +185,7 @@ def _seen_by(
 def _lens(tips: Tips, seen_by: Callable[[str, float], Tips]) -> LensFactor | None:
     """The factor that leaves least of what is off, where it leaves little; it acts linearly."""
     off, errors = tips.parts
-    found: list[tuple[float, LensFactor]] = []
+    fitted: list[tuple[float, LensFactor]] = []
     for kind in ("depth", "width"):
         slope = (seen_by(kind, 1 + TRY).parts[0] - off) / TRY
         variance = 1 / float(np.sum((slope / errors) ** 2))
@@ -195,8 +196,8 @@ def _lens(tips: Tips, seen_by: Callable[[str, float], Tips]) -> LensFactor | Non
         error = float(np.hypot(np.sqrt(variance), LENS_FLOOR))
         if np.linalg.norm(beyond) <= little and abs(more) > SURE * error:
             lens = LensFactor(kind, 1 / (1 + more), error)
-            found.append((float(np.sum((left / errors) ** 2)), lens))
-    return min(found, key=lambda one: one[0])[1] if found else None
+            fitted.append((float(np.sum((left / errors) ** 2)), lens))
+    return min(fitted, key=lambda pair: pair[0])[1] if fitted else None
 
 
 def _fit(

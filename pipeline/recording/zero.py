@@ -64,9 +64,11 @@ def zeroed(
     least = max(SIGMAS * noise, LEAST_STEP * size.max())
     peaks, _ = find_peaks(size, height=least, distance=far)
     found_at = (_step_at(t, force, int(i), near, far) for i in peaks)
-    steps = [one for one in found_at if one and np.linalg.norm(one[1]) > least]
-    steps.sort(key=lambda one: -np.linalg.norm(one[1]))
-    found, values = [], force.copy()
+    steps = [
+        zero_step for zero_step in found_at if zero_step and np.linalg.norm(zero_step[1]) > least
+    ]
+    steps.sort(key=lambda zero_step: -np.linalg.norm(zero_step[1]))
+    zeros, values = [], force.copy()
     for k, step in steps:
         begin = min(k, int(np.searchsorted(t, t[0] + FREE)))
         end = max(k, int(np.searchsorted(t, t[-1] - FREE)))
@@ -77,8 +79,8 @@ def zeroed(
             hand and size < MOST_TOOL * _jump(hand, float(t[k]))
         ):
             values[:k] += step
-            found.append(NewZero(float(t[k]), step))
-    return (values, sorted(found, key=lambda one: one.time)) if found else (force, [])
+            zeros.append(NewZero(float(t[k]), step))
+    return (values, sorted(zeros, key=lambda zero: zero.time)) if zeros else (force, [])
 
 
 def _jump(hand: Hand, time: float) -> float:
@@ -173,7 +175,7 @@ def course(t: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
     if count < LEAST_BLOCKS:
         return 0.0, np.inf, float(np.std(x))
     blocks = np.array_split(np.arange(len(t)), count)
-    at, means = (np.array([v[one].mean() for one in blocks]) for v in (t - t.mean(), x))
+    at, means = (np.array([v[block].mean() for block in blocks]) for v in (t - t.mean(), x))
     slope, middle = np.polyfit(at, means, 1)
     spread = float(np.sqrt(np.sum((means - slope * at - middle) ** 2) / (count - 2)))
     # A slow swing makes neighbouring blocks alike: there are fewer that are independent.

@@ -188,16 +188,16 @@ def outcomes(
     failure[~np.isfinite(hold_force)] = "the simulation did not converge"
     good = np.array([reason is None for reason in failure])
 
-    def known(values: np.ndarray) -> np.ndarray:
+    def where_good(values: np.ndarray) -> np.ndarray:
         return np.where(good, values, np.nan)
 
     return Launches(
-        landing_y=known(landing),
-        speed=known(np.hypot(vy, vz)),
-        angle=known(np.arctan2(vz, vy)),
+        landing_y=where_good(landing),
+        speed=where_good(np.hypot(vy, vz)),
+        angle=where_good(np.arctan2(vz, vy)),
         hold_force=hold_force,
-        separation_time=known(time),
-        separation_y=known(y),
-        separation_z=known(z),
+        separation_time=where_good(time),
+        separation_y=where_good(y),
+        separation_z=where_good(z),
         failure=failure.tolist(),
     )

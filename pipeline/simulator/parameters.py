@@ -63,7 +63,7 @@ class Parameters:
         if unknown := {*given} - {*names} | {*THETA} - {*given}:
             raise ValueError(f"of the law {law}: {', '.join(sorted(unknown))}")
         chosen = (given.get(name, UNSAID.get(name, 0.0)) for name in names)
-        values = np.broadcast_arrays(*(np.atleast_1d(np.asarray(one, float)) for one in chosen))
+        values = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, float)) for value in chosen))
         return cls(law, np.stack(values, axis=1))
 
     @property

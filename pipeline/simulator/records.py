@@ -18,7 +18,10 @@ BRANCHES = len(TIMES)
 def _record(*fields: str | tuple[str, int]) -> np.dtype:
     """Of numbers, and vectors of so many of them."""
     return np.dtype(
-        [(one, float) if isinstance(one, str) else (one[0], float, one[1:]) for one in fields]
+        [
+            (field, float) if isinstance(field, str) else (field[0], float, field[1:])
+            for field in fields
+        ]
     )
 
 
@@ -107,5 +110,5 @@ def macros() -> dict[str, int | str]:
         for field, (_, offset, *_) in (record.fields or {}).items():
             result[f"{name}_{field.upper()}"] = offset // 8
     for codes in (Mode, Grip, Outcome):
-        result |= {f"{codes.__name__.upper()}_{one.name}": f"({one:d})" for one in codes}
+        result |= {f"{codes.__name__.upper()}_{code.name}": f"({code:d})" for code in codes}
     return result

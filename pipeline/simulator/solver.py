@@ -233,7 +233,7 @@ class _Work:
         }
         n_steps = len(schedule.steps)
         first = np.searchsorted(frames.steps, np.arange(n_steps + 1)).astype(np.int32)
-        return {name: self._array(one.astype(self.dtype)) for name, one in values.items()} | {
+        return {name: self._array(array.astype(self.dtype)) for name, array in values.items()} | {
             "frame_first": self._array(first),
             "n_frames": len(frames.steps),
             "frame_width": frames.width,

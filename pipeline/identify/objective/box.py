@@ -46,11 +46,11 @@ class SearchBox:
 
         A method's `bounds` take the place of a parameter's own, and say those of what its law adds.
         """
-        own, names = dict(boxes), parameter_names(law)
-        ends = LAWS[law] | {n: (one.low, one.high) for n, one in boxes} | dict(bounds or {})
+        given, names = dict(boxes), parameter_names(law)
+        ends = LAWS[law] | {n: (axis.low, axis.high) for n, axis in boxes} | dict(bounds or {})
         ends = [ends[name] for name in names]
         low, high = np.array(ends, float).T
-        log = np.array([name in own and own[name].scale == "log" for name in names])
+        log = np.array([name in given and given[name].scale == "log" for name in names])
         return cls(names, low, high, log, law, dict(fixed or {}))
 
     @classmethod
@@ -77,7 +77,10 @@ class SearchBox:
     def _rest(self) -> np.ndarray:
         """A point of the whole unit cube that holds the fixed coordinates, shape (D,)."""
         middle = self.to_physical(np.full(self.dimension, 0.5))
-        values = [self.fixed.get(name, one) for name, one in zip(self.names, middle, strict=True)]
+        values = [
+            self.fixed.get(name, middle_value)
+            for name, middle_value in zip(self.names, middle, strict=True)
+        ]
         return self.to_unit(np.array(values, float))
 
     def fill(self, unit: np.ndarray) -> np.ndarray:

@@ -78,16 +78,17 @@ class DeviceTerms:
         import warp as wp
 
         with self._lock:
-            known, copies = self._copies.get(device, (None, {}))
-            if known is not matrix:
+            shared, copies = self._copies.get(device, (None, {}))
+            if shared is not matrix:
                 rows = {"first": matrix.indptr, "columns": matrix.indices}
-                values = {name: np.ravel(one) for name, one in self._shared.items()}
+                values = {name: np.ravel(array) for name, array in self._shared.items()}
                 values["values"] = matrix.data
                 copies = {
-                    name: wp.array(one.astype(np.int32), device=device)
-                    for name, one in rows.items()
+                    name: wp.array(array.astype(np.int32), device=device)
+                    for name, array in rows.items()
                 } | {
-                    name: wp.array(one.astype(float), device=device) for name, one in values.items()
+                    name: wp.array(array.astype(float), device=device)
+                    for name, array in values.items()
                 }
                 self._copies[device] = matrix, copies
             return copies

@@ -28,13 +28,13 @@ def simulate_of(engine: str) -> Simulate:
     if engine == OUR_ENGINE:
         return simulated
     try:
-        found = imported(engine if is_import(engine) else _installed(engine))
+        simulate = imported(engine if is_import(engine) else _installed(engine))
     except Exception as error:  # a module of the user's may raise anything
         message = one_line(f"{type(error).__name__}: {error}")
         raise UserError(f"engine {engine}: cannot be imported ({message})") from error
-    if not callable(found):
+    if not callable(simulate):
         raise UserError(f"engine {engine}: must be a function; see docs/simulator.md")
-    return cast(Simulate, found)
+    return cast(Simulate, simulate)
 
 
 def _installed(engine: str) -> str:

@@ -149,8 +149,8 @@ class EpisodeLoss:
         the bit in any batch.
         """
         if not isinstance(rollouts.force, np.ndarray):
-            found = self._on_device(rollouts, self._filter(rollouts.times))
-            return dict(zip(TERMS, found.T, strict=True))
+            on_device = self._on_device(rollouts, self._filter(rollouts.times))
+            return dict(zip(TERMS, on_device.T, strict=True))
         gap, frames = self._gap(rollouts), self.frames(rollouts)
         power = np.einsum("ntc,tc->nt", gap, self.velocity)
         both = self.fitted_samples[:-1] & self.fitted_samples[1:]  # ends of a trapezoid

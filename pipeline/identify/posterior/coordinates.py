@@ -83,22 +83,26 @@ class Coordinates:
     @classmethod
     def of_method(cls, params: Params, method: str, sling: ClampedBand) -> Coordinates:
         """Of a method of params.yaml that searches by least squares, and its band's sling."""
-        about = params.methods[method]
-        box = {name: (one.low, one.high) for name, one in params.parameters} | dict(about.bounds)
+        method_params = params.methods[method]
+        box = {name: (axis.low, axis.high) for name, axis in params.parameters} | dict(
+            method_params.bounds
+        )
         young, damping = (box[THETA[i]] for i in (YOUNG, DAMPING))
-        product = np.array(damping) * about.fixed["damping_scale"]
+        product = np.array(damping) * method_params.fixed["damping_scale"]
         wave = np.sqrt(sling.rest_length * sling.mass / sling.area)
         loss = np.log(product / wave) + np.log(young) / 2
         ends = dict(zip(LOGS, (np.log(young), loss), strict=True))
-        ends |= {name: box[name] for name in LAWS[about.law] if name not in about.fixed} | {
+        ends |= {
+            name: box[name] for name in LAWS[method_params.law] if name not in method_params.fixed
+        } | {
             "air_drag": (0.0, MOST_DRAG),
             "turn_damping": (0.0, 1.0),
             "log_returned_share": (-MOST_LOST, MOST_LOST),
         }
         low, high = np.array(list(ends.values()), float).T
         expected, spread = np.array([PRIORS.get(name, (0.0, np.inf)) for name in ends]).T
-        names, fixed = tuple(ends), dict(about.fixed)
-        return cls(about.law, names, low, high, fixed, float(wave), expected, spread**-2)
+        names, fixed = tuple(ends), dict(method_params.fixed)
+        return cls(method_params.law, names, low, high, fixed, float(wave), expected, spread**-2)
 
     @property
     def steps(self) -> np.ndarray:
@@ -111,12 +115,12 @@ class Coordinates:
 
     def quantiles(self, parts: np.ndarray) -> np.ndarray:
         """Of each coordinate's prior, even or a Gaussian within its bounds, at parts (N, D)."""
-        found = self.low + parts * (self.high - self.low)
-        known = self.precision > 0
-        mean, spread = self.expected[known], self.precision[known] ** -0.5
-        low, high = ((end[known] - mean) / spread for end in (self.low, self.high))
-        found[:, known] = truncnorm.ppf(parts[:, known], low, high, mean, spread)
-        return found
+        values = self.low + parts * (self.high - self.low)
+        gaussian = self.precision > 0
+        mean, spread = self.expected[gaussian], self.precision[gaussian] ** -0.5
+        low, high = ((end[gaussian] - mean) / spread for end in (self.low, self.high))
+        values[:, gaussian] = truncnorm.ppf(parts[:, gaussian], low, high, mean, spread)
+        return values
 
     def shows(self, name: str) -> int | None:
         """Number of the coordinate that a parameter shows; None: it is fixed."""

@@ -110,15 +110,17 @@ class PullDesign:
             times: As the attribute.
             targets: Landings [m].
         """
-        about = params.methods[method]
+        method_params = params.methods[method]
         name, bounds = SOFTENING
-        about = about.model_copy(
+        method_params = method_params.model_copy(
             update={
-                "fixed": {key: value for key, value in about.fixed.items() if key != name},
-                "bounds": {name: bounds} | dict(about.bounds),
+                "fixed": {key: value for key, value in method_params.fixed.items() if key != name},
+                "bounds": {name: bounds} | dict(method_params.bounds),
             }
         )
-        params = params.model_copy(update={"methods": dict(params.methods) | {method: about}})
+        params = params.model_copy(
+            update={"methods": dict(params.methods) | {method: method_params}}
+        )
         sling = ClampedBand.of(params.bands[band], params.setup, params.sling, law=RUBBER)
         coordinates = Coordinates.of_method(params, method, sling)
         rng = np.random.default_rng(params.optimizer.seed)
@@ -153,8 +155,8 @@ class PullDesign:
         """The planned pull, with one picture, of the hanging band."""
         hanging = hanging_guess(self.sling)[self.sling.middle, 2]
         pull_time, pause = self.times
-        about = {"pull_time": pull_time, "pause": pause, "dips": dips}
-        made = planned_pull(self.params.episode, "planned", hanging, self.draw, **about)
+        description = {"pull_time": pull_time, "pause": pause, "dips": dips}
+        made = planned_pull(self.params.episode, "planned", hanging, self.draw, **description)
         return replace(made, cloud_time=made.cloud_time[:1], clouds=made.clouds[:1])
 
     def information(self, dips: Sequence[Dip]) -> np.ndarray:
@@ -183,10 +185,12 @@ class PullDesign:
         force = average(done.times, along, *sampling, len(episode.time))
         force = np.moveaxis(force[Rule().samples(episode)], 0, 1).reshape(count, size, -1, 2)
         progress = np.zeros((count, len(steps), len(steps)))
-        for one, bad, at in zip(force, failed, progress, strict=True):
+        for lane_force, bad, at in zip(force, failed, progress, strict=True):
             if not bad.any():
-                slopes = (one[1:] - one[0]) / steps[affected, None, None]
-                at[np.ix_(affected, affected)] = eliminated(slopes, one[0], episode.sample_period)
+                slopes = (lane_force[1:] - lane_force[0]) / steps[affected, None, None]
+                at[np.ix_(affected, affected)] = eliminated(
+                    slopes, lane_force[0], episode.sample_period
+                )
         return progress
 
 
@@ -234,7 +238,10 @@ def eliminated(slopes: np.ndarray, force: np.ndarray, period: float) -> np.ndarr
     for axis in np.eye(force.shape[1]):
         nuisances += [has.bias * np.outer(np.ones_like(course), axis)]
         nuisances += [has.drift * np.outer(course, axis)]
-    j, n = (np.reshape(one, (len(one), -1)) / has.force for one in (slopes, np.array(nuisances)))
+    j, n = (
+        np.reshape(columns, (len(columns), -1)) / has.force
+        for columns in (slopes, np.array(nuisances))
+    )
     across = j @ n.T
     return j @ j.T - across @ np.linalg.solve(n @ n.T + np.eye(len(n)), across.T)
 
@@ -260,23 +267,23 @@ class _Landings:
         """Parts of the way from which N coordinates land at or nearest to T targets, (N, T)."""
         parts = np.linspace(0, 1, PLACES)
         every = self._log(np.repeat(phi, PLACES, axis=0), np.tile(parts, len(phi)))
-        found = np.full((len(phi), len(targets)), np.nan)
-        for row, landed in zip(found, every.reshape(len(phi), -1), strict=True):
+        draws = np.full((len(phi), len(targets)), np.nan)
+        for row, landed in zip(draws, every.reshape(len(phi), -1), strict=True):
             good = np.isfinite(landed)
             if good.any():
                 row[:] = np.interp(
                     np.log(targets), np.maximum.accumulate(landed[good]), parts[good]
                 )
-        return found
+        return draws
 
     def gradient(self, phi: np.ndarray, parts: np.ndarray) -> np.ndarray:
         """Of log landings in the coordinates, shape (N, T, D); NaN where a launch fails."""
         steps = self.coordinates.steps
         moved = np.vstack([0 * steps, np.diag(steps)])
         n, t, m = *parts.shape, len(moved)
-        known = np.nan_to_num(parts)
+        finite = np.nan_to_num(parts)
         at = np.broadcast_to((phi[:, None] + moved)[:, None], (n, t, m, len(steps)))
-        logs = self._log(at.reshape(n * t * m, -1), np.repeat(known.ravel(), m)).reshape(n, t, m)
+        logs = self._log(at.reshape(n * t * m, -1), np.repeat(finite.ravel(), m)).reshape(n, t, m)
         change = (logs[..., 1:] - logs[..., :1]) / steps
         return np.where(np.isfinite(parts)[..., None], change, np.nan)
 
@@ -291,13 +298,13 @@ def searched(
     Args:
         progress: Of each pull that was tried, and the mean of its variances.
     """
-    size, found = float(np.hypot(*design.draw)), {}
+    size, gains = float(np.hypot(*design.draw)), {}
 
     def value(dips: tuple[Dip, ...]) -> float:
-        if dips not in found:
-            found[dips] = float(design.variances(dips).mean())
-            progress(dips, found[dips])
-        return found[dips]
+        if dips not in gains:
+            gains[dips] = float(design.variances(dips).mean())
+            progress(dips, gains[dips])
+        return gains[dips]
 
     best: tuple[Dip, ...] = ()
     for _ in range(MOST_DIPS):
@@ -319,7 +326,7 @@ def searched(
             bounds=[(0, 1)] * len(start),
             options={"rhobeg": RHO, "tol": RHO / 5, "maxiter": REFINED},
         )
-    return min(found, key=lambda dips: found[dips])
+    return min(gains, key=lambda dips: gains[dips])
 
 
 def lasts(dips: Sequence[Dip]) -> float:
@@ -354,7 +361,7 @@ def _of_unit(x: np.ndarray, size: float, limits: PullLimits) -> tuple[Dip, ...]:
     at, part, out, back = np.clip(x, 0, 1).reshape(-1, 4).T
     at = FIRST + (1 - FIRST) * at
     depth = np.round((SHALLOW + (DEEPEST - SHALLOW) * part) * at * size, 2)
-    shortest = np.array([limits.shortest(one) for one in depth])
+    shortest = np.array([limits.shortest(depth_i) for depth_i in depth])
     longer = shortest * ((SLOWEST / shortest) ** np.array([out, back]) - 1)
     room = limits.spare - 2 * shortest.sum() - 2 * len(at) * TICK
     longer *= np.clip(room / max(longer.sum(), 1e-9), 0, 1)

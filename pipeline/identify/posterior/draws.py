@@ -28,14 +28,14 @@ def truncated_gaussian(
     spread = 1 / np.sqrt(np.diag(precision))
     chains = np.tile(np.clip(centre, low, high), (count, 1))
     for _ in range(BURN * THIN):
-        for axis, own in enumerate(spread):
+        for axis, deviation in enumerate(spread):
             pull = (chains - centre) @ precision[axis] - precision[axis, axis] * (
                 chains[:, axis] - centre[axis]
             )
-            mean = centre[axis] - pull * own**2
-            ends = [((end[axis] - mean) / own).clip(-FAR, FAR) for end in (low, high)]
+            mean = centre[axis] - pull * deviation**2
+            ends = [((end[axis] - mean) / deviation).clip(-FAR, FAR) for end in (low, high)]
             below, above = map(ndtr, ends)
             part = below + rng.random(count) * (above - below)
             tail = np.where(above > below, ndtri(np.clip(part, 1e-16, 1 - 1e-16)), ends[0])
-            chains[:, axis] = np.clip(mean + own * tail, low[axis], high[axis])
+            chains[:, axis] = np.clip(mean + deviation * tail, low[axis], high[axis])
     return chains

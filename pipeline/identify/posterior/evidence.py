@@ -48,11 +48,15 @@ def read_launches(path: Path, error: float | None) -> list[Observed]:
     """
     launches = []
     for row in table.rows(path, "evidence"):
-        where, own = row.where, row.cells["draw_error_m"]
+        where, draw_error = row.where, row.cells["draw_error_m"]
         if row.landing is None:
             raise UserError(f"{where}: a launch that did not land is no evidence, leave it out")
-        own = expect_error(where, table.number(where, "draw_error_m", own)) if own else error
-        launches.append(Observed(row.draw, own, row.landing))
+        draw_error = (
+            expect_error(where, table.number(where, "draw_error_m", draw_error))
+            if draw_error
+            else error
+        )
+        launches.append(Observed(row.draw, draw_error, row.landing))
     return launches
 
 
@@ -79,7 +83,7 @@ class ObservedFile(JsonRecord):
 
 def save_observed(path: Path, launches: Sequence[Observed], params: Params) -> None:
     """Write an `ObservedFile`; without launches it is the same whatever the lab is."""
-    content: dict = {"launches": [vars(one) for one in launches]}
+    content: dict = {"launches": [vars(launch) for launch in launches]}
     if launches:
         setup = vars(LaunchSetup.of(params.setup, params.sling))
         content["setup"] = {name: setup[name] for name in SetupRecord.model_fields}
@@ -92,7 +96,7 @@ def load_observed(path: Path) -> Evidence | None:
     read = read_json(path, ObservedFile)
     if not read.launches or read.setup is None:
         return None
-    launches = [Observed(one.draw, one.error, one.landing) for one in read.launches]
+    launches = [Observed(launch.draw, launch.error, launch.landing) for launch in read.launches]
     setup = {name: getattr(read.setup, name) for name in SetupRecord.model_fields}
     return Evidence(launches, LaunchSetup(**setup), read.made_with)
 

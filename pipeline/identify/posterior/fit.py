@@ -81,12 +81,18 @@ def fit(
     damp, gone, new = DAMP, np.inf, [None] * len(recordings)
     with ThreadPoolExecutor(workers) as pool:
         for steps in range(1, ITERATIONS + 1):
-            bins = [one.residuals for one in best.expansions] if best and steps > BINNED else new
+            bins = (
+                [expansion.residuals for expansion in best.expansions]
+                if best and steps > BINNED
+                else new
+            )
             around = coordinates.parameters, phi, _steps(coordinates, phi)
             try:
                 expansions = [
-                    one.expand(*around, own, pool, retained)
-                    for one, own, retained in zip(recordings, nuisances, bins, strict=True)
+                    likelihood.expand(*around, nuisance, pool, retained)
+                    for likelihood, nuisance, retained in zip(
+                        recordings, nuisances, bins, strict=True
+                    )
                 ]
             except Failed as why:
                 if best is None:
@@ -115,8 +121,8 @@ def fit(
             phi = best.phi + step
             nuisances = np.array(
                 [
-                    own + one.nuisances[0] / (1 + damp) + one.nuisances[1] @ step
-                    for own, one in zip(best.nuisances, best.expansions, strict=True)
+                    nuisance + expansion.nuisances[0] / (1 + damp) + expansion.nuisances[1] @ step
+                    for nuisance, expansion in zip(best.nuisances, best.expansions, strict=True)
                 ]
             )
     assert best is not None
@@ -146,11 +152,11 @@ def _density(
     misfit, hessian, gradient = launches or (0.0, 0.0, 0.0)
     return Fit(
         phi=phi,
-        hessian=sum(one.hessian for one in expansions) + np.diag(prior) + hessian,
-        gradient=sum(one.gradient for one in expansions) - prior * gap + gradient,
+        hessian=sum(expansion.hessian for expansion in expansions) + np.diag(prior) + hessian,
+        gradient=sum(expansion.gradient for expansion in expansions) - prior * gap + gradient,
         nuisances=nuisances,
         expansions=expansions,
-        misfit=sum(one.misfit for one in expansions) + float(prior @ gap**2) + misfit,
+        misfit=sum(expansion.misfit for expansion in expansions) + float(prior @ gap**2) + misfit,
         steps=steps,
         settled=False,
     )

@@ -67,8 +67,9 @@ class LandingModel:
     def after(self, covariance: np.ndarray | None = None, draw: float = 1.0) -> np.ndarray:
         """Half widths [m], shape (T,), with another covariance and a share of the draw's error."""
         now, then = (
-            np.einsum("td,de,te->t", self.gradient, one, self.gradient) + (share * self.draw) ** 2
-            for one, share in (
+            np.einsum("td,de,te->t", self.gradient, covariance_t, self.gradient)
+            + (share * self.draw) ** 2
+            for covariance_t, share in (
                 (self.covariance, 1.0),
                 (self.covariance if covariance is None else covariance, draw),
             )

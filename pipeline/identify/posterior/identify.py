@@ -97,44 +97,47 @@ def fit_posterior(
     """
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
     friction = params.methods[method].fixed["dynamic_friction"]
-    recordings = [Likelihood(one, sling, cutoff, friction) for one in episodes]
+    recordings = [Likelihood(episode, sling, cutoff, friction) for episode in episodes]
     coordinates = Coordinates.of_method(params, method, sling)
     launches = None
     if evidence and evidence.launches:
         setup = replace(evidence.setup, history=recorded_history(sling, episodes))
         launches = LaunchLikelihood(evidence.launches, sling, setup)
-    known = {"launches": launches, "workers": workers, "progress": progress}
+    options = {"launches": launches, "workers": workers, "progress": progress}
     begin = coordinates.of(start)
     nearest = coordinates.parameters(begin[None])
     try:
-        recordings = [one.aligned(nearest) for one in recordings]
+        recordings = [recording.aligned(nearest) for recording in recordings]
     except Failed:
         pass  # the fit says why
-    found = fit(recordings, coordinates, begin, **known)
-    follows = [one.told_by(it) for one, it in zip(recordings, found.expansions, strict=True)]
+    fitted = fit(recordings, coordinates, begin, **options)
+    follows = [
+        recording.told_by(it) for recording, it in zip(recordings, fitted.expansions, strict=True)
+    ]
     if any(
-        getattr(wide.tolerances, what) > WIDER * getattr(one.tolerances, what)
-        for one, wide in zip(recordings, follows, strict=True)
+        getattr(wide.tolerances, what) > WIDER * getattr(recording.tolerances, what)
+        for recording, wide in zip(recordings, follows, strict=True)
         for what in ("force", "way")
     ):
-        recordings, first = follows, found
-        found = fit(recordings, coordinates, first.phi, **known)
-        found = replace(found, steps=first.steps + found.steps)
-    for one in found.expansions:
-        if not len(one.residuals.frame):
+        recordings, first = follows, fitted
+        fitted = fit(recordings, coordinates, first.phi, **options)
+        fitted = replace(fitted, steps=first.steps + fitted.steps)
+    for expansion in fitted.expansions:
+        if not len(expansion.residuals.frame):
             print(
-                f"note: {one.residuals.episode.band}: its pictures show fewer than {LEAST_POINTS}"
-                f" points in each of {BINS} parts of the band, so its force alone is fitted",
+                f"note: {expansion.residuals.episode.band}: its pictures show fewer than"
+                f" {LEAST_POINTS} points in each of {BINS} parts of the band, so its force alone is"
+                " fitted",
                 file=sys.stderr,
             )
-    birge = disagreement(found)
+    birge = disagreement(fitted)
     rng = np.random.default_rng(params.optimizer.seed)
-    samples = samples_around(found, coordinates, birge, rng)
-    return Identified(coordinates, found, birge, samples, recordings, launches)
+    samples = samples_around(fitted, coordinates, birge, rng)
+    return Identified(coordinates, fitted, birge, samples, recordings, launches)
 
 
 def samples_around(
-    found: Fit, coordinates: Coordinates, widened: float, rng: np.random.Generator
+    fitted: Fit, coordinates: Coordinates, widened: float, rng: np.random.Generator
 ) -> np.ndarray:
     """SAMPLES of the Gaussian around a mode, within bounds, shape (SAMPLES, D).
 
@@ -145,9 +148,9 @@ def samples_around(
         widened: By what the density's standard deviations are multiplied.
     """
     box = coordinates.low, coordinates.high
-    outward = np.where(found.gradient < 0, found.phi <= box[0], found.phi >= box[1])
-    centre = found.phi + np.linalg.solve(found.hessian, found.gradient * outward)
-    return truncated_gaussian(centre, found.hessian / widened**2, *box, SAMPLES, rng)
+    outward = np.where(fitted.gradient < 0, fitted.phi <= box[0], fitted.phi >= box[1])
+    centre = fitted.phi + np.linalg.solve(fitted.hessian, fitted.gradient * outward)
+    return truncated_gaussian(centre, fitted.hessian / widened**2, *box, SAMPLES, rng)
 
 
 def recorded_history(sling: ClampedBand, episodes: Sequence[Episode]) -> LaunchHistory | None:
@@ -157,48 +160,50 @@ def recorded_history(sling: ClampedBand, episodes: Sequence[Episode]) -> LaunchH
     """
     if sling.law != RUBBER:
         return None
-    own = launch_history(episodes[0])
-    return LaunchHistory(own["pull_time"], own["pause"], deepest_draw(episodes))
+    pull_history = launch_history(episodes[0])
+    return LaunchHistory(pull_history["pull_time"], pull_history["pause"], deepest_draw(episodes))
 
 
-def disagreement(found: Fit) -> float:
+def disagreement(fitted: Fit) -> float:
     """Birge's ratio of N recordings, at least 1: how far each alone would go from the mode.
 
     Of each, the drop of its misfit to its own least is chi squared of D' D (N - 1)/N coordinates
     that it tells, D' those which it knows better than the rest together.
     """
-    if len(found.expansions) < 2:
+    if len(fitted.expansions) < 2:
         return 1.0
     total = freedom = 0.0
-    for one in found.expansions:
-        inverse = np.linalg.inv(one.hessian + found.hessian)  # regular where it alone tells nothing
-        summary = np.linalg.solve(found.hessian, one.hessian)
-        total += one.gradient @ inverse @ one.gradient
-        freedom += np.trace(inverse @ one.hessian @ (np.eye(len(summary)) - summary))
+    for expansion in fitted.expansions:
+        inverse = np.linalg.inv(
+            expansion.hessian + fitted.hessian
+        )  # regular where it alone tells nothing
+        summary = np.linalg.solve(fitted.hessian, expansion.hessian)
+        total += expansion.gradient @ inverse @ expansion.gradient
+        freedom += np.trace(inverse @ expansion.hessian @ (np.eye(len(summary)) - summary))
     return float(np.sqrt(max(total / max(freedom, 1e-9), 1.0)))
 
 
-def theta_entries(found: Identified) -> dict:
+def theta_entries(identified: Identified) -> dict:
     """What a θ file holds of the mode: of the band after its recordings and launches."""
-    episodes = [one.episode for one in found.recordings]
-    history = recorded_history(found.recordings[0].sling, episodes)
-    if history and found.launches:
-        history = replace(history, deepest=found.launches.after)
-    return content_of(found.mode, history)
+    episodes = [recording.episode for recording in identified.recordings]
+    history = recorded_history(identified.recordings[0].sling, episodes)
+    if history and identified.launches:
+        history = replace(history, deepest=identified.launches.after)
+    return content_of(identified.mode, history)
 
 
-def confidence(found: Identified) -> dict:
+def confidence(identified: Identified) -> dict:
     """What a θ file says under `confidence`, ready for JSON.
 
     A parameter is identifiable if its interval is less than FILLS of its prior's, as the
     coordinate that shows it has them.
     """
-    samples, mode, parameters = found.parameters, found.mode.sample(), {}
+    samples, mode, parameters = identified.parameters, identified.mode.sample(), {}
     columns = {name: samples.column(name) for name in samples.names}
     product = "damping_product"
     columns[product] = columns["elasticity_damping"] * columns["damping_scale"]
     mode[product] = mode["elasticity_damping"] * mode["damping_scale"]
-    priors = _priors(found)
+    priors = _priors(identified)
     for name in parameter_names(samples.law):
         low, high = interval(columns[name], mode[name])
         entry = {"low": low, "high": high, "identifiable": name in priors}
@@ -211,31 +216,33 @@ def confidence(found: Identified) -> dict:
         name: _told(columns[name], mode[name], SI_UNITS.get(name, "")) | priors[name]
         for name in (*EXTRA, product)
     }
-    derived |= _clocks(found)
-    matrix = np.corrcoef(found.samples.T + 1e-12 * np.arange(SAMPLES))
+    derived |= _clocks(identified)
+    matrix = np.corrcoef(identified.samples.T + 1e-12 * np.arange(SAMPLES))
     return {
         "level": LEVEL,
         "parameters": parameters,
         "derived": derived,
-        "correlation": {"names": list(found.coordinates.names), "matrix": matrix.tolist()},
-        "recordings": [_left(found, number) for number in range(len(found.recordings))],
-        "disagreement": found.birge,
-        "launches": _launched(found),
-        "steps": found.fit.steps,
-        "settled": found.fit.settled,
+        "correlation": {"names": list(identified.coordinates.names), "matrix": matrix.tolist()},
+        "recordings": [_left(identified, number) for number in range(len(identified.recordings))],
+        "disagreement": identified.birge,
+        "launches": _launched(identified),
+        "steps": identified.fit.steps,
+        "settled": identified.fit.settled,
     }
 
 
-def _priors(found: Identified) -> dict[str, dict]:
+def _priors(identified: Identified) -> dict[str, dict]:
     """Of what is not fixed: the prior's interval, all else at the mode; if it is identified."""
-    coordinates, result = found.coordinates, {}
+    coordinates, result = identified.coordinates, {}
     ends = coordinates.prior(LEVEL)
-    widths = np.ptp(np.quantile(found.samples, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0), axis=0)
+    widths = np.ptp(
+        np.quantile(identified.samples, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0), axis=0
+    )
     for name in (*parameter_names(coordinates.law), *EXTRA, "damping_product"):
         axis = coordinates.shows(name)
         if axis is None:
             continue
-        phi = np.repeat(found.fit.phi[None], 2, axis=0)
+        phi = np.repeat(identified.fit.phi[None], 2, axis=0)
         phi[:, axis] = ends[:, axis]
         at = coordinates.parameters(phi)
         if name == "damping_product":
@@ -262,58 +269,63 @@ def _told(samples: np.ndarray, mode: float, unit: str) -> dict:
     return {"value": mode, "low": low, "high": high, "unit": unit}
 
 
-def _clocks(found: Identified) -> dict:
+def _clocks(identified: Identified) -> dict:
     """Release and camera's delay of the first recording, with what its expansion leaves open."""
-    one, own = found.fit.expansions[0], found.fit.nuisances[0]
-    change = one.nuisances[1]
-    covariance = np.linalg.inv(found.fit.hessian)
-    spread = np.sqrt(one.spread**2 + np.einsum("id,de,ie->i", change, covariance, change))
+    expansion, nuisances = identified.fit.expansions[0], identified.fit.nuisances[0]
+    change = expansion.nuisances[1]
+    covariance = np.linalg.inv(identified.fit.hessian)
+    spread = np.sqrt(expansion.spread**2 + np.einsum("id,de,ie->i", change, covariance, change))
     release, camera = (SIMULATED.index(name) for name in ("release", "camera"))
-    time = found.recordings[0].episode.release_time + own[release]
-    wide = 1.645 * spread * found.birge
+    time = identified.recordings[0].episode.release_time + nuisances[release]
+    wide = 1.645 * spread * identified.birge
     return {
         name: {"value": value, "low": value - wide[i], "high": value + wide[i], "unit": "s"}
         for name, value, i in (
             ("release_time", time, release),
-            ("camera_delay", -own[camera] - found.recordings[0].moved, camera),
+            ("camera_delay", -nuisances[camera] - identified.recordings[0].moved, camera),
         )
     }
 
 
-def _left(found: Identified, number: int) -> dict:
+def _left(identified: Identified, number: int) -> dict:
     """What a recording shows that the simulation does not, and what the others alone say of it."""
-    one, recording = found.fit.expansions[number], found.recordings[number]
-    about: dict = {"force_rms": one.rms("force"), "held_rms": one.rms("held")}
-    about |= {"recoil_rms": one.rms("recoil"), "pictures": one.pictures}
-    about["source"] = recording.episode.metadata.get("input", {})
-    if len(found.recordings) > 1:
-        about["without_it"] = without(found, number)
-    return about
+    expansion, recording = identified.fit.expansions[number], identified.recordings[number]
+    entry: dict = {"force_rms": expansion.rms("force"), "held_rms": expansion.rms("held")}
+    entry |= {"recoil_rms": expansion.rms("recoil"), "pictures": expansion.pictures}
+    entry["source"] = recording.episode.metadata.get("input", {})
+    if len(identified.recordings) > 1:
+        entry["without_it"] = without(identified, number)
+    return entry
 
 
-def without(found: Identified, number: int) -> dict:
+def without(identified: Identified, number: int) -> dict:
     """How the mode of all other evidence predicts a recording, by their quadratics."""
-    one = found.fit.expansions[number]
-    hessian, gradient = found.fit.hessian - one.hessian, found.fit.gradient - one.gradient
-    phi = np.clip(
-        found.fit.phi + np.linalg.solve(hessian, gradient),
-        found.coordinates.low,
-        found.coordinates.high,
+    expansion = identified.fit.expansions[number]
+    hessian, gradient = (
+        identified.fit.hessian - expansion.hessian,
+        identified.fit.gradient - expansion.gradient,
     )
-    moved = phi - found.fit.phi
-    worse = moved @ one.hessian @ moved - 2 * one.gradient @ moved
+    phi = np.clip(
+        identified.fit.phi + np.linalg.solve(hessian, gradient),
+        identified.coordinates.low,
+        identified.coordinates.high,
+    )
+    moved = phi - identified.fit.phi
+    worse = moved @ expansion.hessian @ moved - 2 * expansion.gradient @ moved
     spread = np.sqrt(np.diag(np.linalg.inv(hessian)))
     return {
         "misfit": float(worse),
-        "moved": dict(zip(found.coordinates.names, (moved / spread).tolist(), strict=True)),
+        "moved": dict(zip(identified.coordinates.names, (moved / spread).tolist(), strict=True)),
     }
 
 
-def _launched(found: Identified) -> list[dict]:
-    launches = found.launches
+def _launched(identified: Identified) -> list[dict]:
+    launches = identified.launches
     if launches is None:
         return []
-    unlikely = without_each(launches, found.fit.hessian, found.fit.gradient, found.birge)
+    unlikely = without_each(
+        launches, identified.fit.hessian, identified.fit.gradient, identified.birge
+    )
     parts = launches.draws, launches.landings, launches.left, unlikely
     return [
         {

@@ -72,9 +72,9 @@ class LaunchLikelihood:
         self, observed: Sequence[Observed], sling: ClampedBand, setup: LaunchSetup
     ) -> None:
         self.sling, self.setup = sling, setup
-        self.draws = np.array([one.draw for one in observed], float).reshape(-1, 2)
-        self.errors = np.array([one.error for one in observed], float)
-        self.landings = np.array([one.landing for one in observed], float)
+        self.draws = np.array([launched.draw for launched in observed], float).reshape(-1, 2)
+        self.errors = np.array([launched.error for launched in observed], float)
+        self.landings = np.array([launched.landing for launched in observed], float)
         first = setup.history.deepest if setup.history else 0.0
         seen = np.maximum.accumulate(np.append(first, np.linalg.norm(self.draws, axis=1)))
         self.deepest, self.after = seen[:-1], float(seen[-1])

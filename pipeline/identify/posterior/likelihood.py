@@ -68,11 +68,11 @@ class Tolerances:
     @classmethod
     def of(cls, episode: Episode) -> Tolerances:
         """From an episode's metadata, or as usual where it says nothing."""
-        about = episode.metadata.get("preprocessing", {})
-        delays = about.get("delays") or {}
+        preprocessing = episode.metadata.get("preprocessing", {})
+        delays = preprocessing.get("delays") or {}
         clocks = {name: delays.get(name) or {} for name in ("camera", "pose")}
-        given = {name: one.get("left") or one.get("error") for name, one in clocks.items()}
-        given["release"] = about.get("release_error")
+        given = {name: clock.get("left") or clock.get("error") for name, clock in clocks.items()}
+        given["release"] = preprocessing.get("release_error")
         if given["camera"] and clocks["camera"].get("against", "pose") == "pose":
             given["camera"] = np.hypot(given["camera"], given["pose"] or 0.0)
             if clocks["pose"].get("against") == "release":  # and so is the camera's, by the pose
@@ -133,7 +133,11 @@ class Expansion:
         bins, gone = self.left[count:].reshape(2, -1), seen.gone()
         pictures = [seen.frame == frame for frame in np.unique(seen.frame[seen.recoils])]
         return max(
-            (_repeated(bins[axis, one]) / gone[one][0] for one in pictures for axis in (0, 1)),
+            (
+                _repeated(bins[axis, picture]) / gone[picture][0]
+                for picture in pictures
+                for axis in (0, 1)
+            ),
             default=0.0,
         )
 
@@ -247,15 +251,15 @@ class Likelihood:
         They end with the last picture that counts.
         """
         episode = self.shifted(nuisances)
-        stamps = [episode.cloud_time + one for one in late]
+        stamps = [episode.cloud_time + delay for delay in late]
         every, places = np.unique(np.concatenate(stamps), return_inverse=True)
         seen = replace(episode, cloud_time=every)
         done = interact(self.sling, seen, parameters, until=max(every, default=np.inf))
-        if why := next((one for one in done.failure if one), None):
+        if why := next((reason for reason in done.failure if reason), None):
             raise Failed(why)
         return [
-            replace(done, cloud_time=one, center_line=done.center_line[:, where])
-            for one, where in zip(stamps, np.split(places, len(stamps)), strict=True)
+            replace(done, cloud_time=times, center_line=done.center_line[:, where])
+            for times, where in zip(stamps, np.split(places, len(stamps)), strict=True)
         ]
 
     def expand(
@@ -287,29 +291,29 @@ class Likelihood:
             self.episode, self.sling, self.cutoff, first.center_line[0]
         )
         vectors = residuals(first)
-        moved = np.concatenate([residuals(one) for one in (released, later, led)])
+        moved = np.concatenate([residuals(rollouts) for rollouts in (released, later, led)])
         gap = vectors[0]
         slopes = (vectors[1:] - gap) / steps[:, None]
         # The recoil shows damping. A law that lacks slow hysteresis would take it for that.
         slopes[LOSS, : 3 * len(residuals.samples)] = 0.0
-        own = (moved - gap) / NUDGE[:, None]
-        return self._eliminated(residuals, gap, slopes, own, nuisances)
+        nuisance_slopes = (moved - gap) / NUDGE[:, None]
+        return self._eliminated(residuals, gap, slopes, nuisance_slopes, nuisances)
 
     def _eliminated(
         self,
         residuals: Residuals,
         gap: np.ndarray,
         slopes: np.ndarray,
-        own: np.ndarray,
+        nuisance_slopes: np.ndarray,
         nuisances: np.ndarray,
     ) -> Expansion:
         has = self.tolerances
-        linear = self._linear(residuals, gap, own[SIMULATED.index("camera")])
+        linear = self._linear(residuals, gap, nuisance_slopes[SIMULATED.index("camera")])
         # Of the camera's clock `moved` was taken beforehand, and belongs to what its prior judges.
         nuisances = nuisances + self.moved * (np.array(SIMULATED) == "camera")
         weight = 1 / residuals.spread(has.force, has.cloud, has.way)
         count, inner = len(slopes), len(SIMULATED)
-        design = np.concatenate([slopes, own, linear]) * weight  # (D + 3 + M, R)
+        design = np.concatenate([slopes, nuisance_slopes, linear]) * weight  # (D + 3 + M, R)
         left = -gap * weight
         gram, slope = design @ design.T, design @ left
         n = slice(count, count + inner)
@@ -335,11 +339,11 @@ class Likelihood:
 
     def _linear(self, residuals: Residuals, gap: np.ndarray, camera: np.ndarray) -> np.ndarray:
         """Columns of the linear nuisances, each in units of its tolerance, shape (M, R)."""
-        has, known = self.tolerances, residuals.columns(gap)
+        has, changes = self.tolerances, residuals.columns(gap)
         sizes = {"force_bias": has.bias, "force_drift": has.drift}
         sizes |= {"force_gain": has.gain, "force_late": has.pose}
         sizes |= {"cloud_shift": has.shift, "cloud_turn": has.turn}
-        columns = [sizes[re.sub("_[xyz]$", "", name)] * one for name, one in known.items()]
+        columns = [sizes[re.sub("_[xyz]$", "", name)] * change for name, change in changes.items()]
         for frame in np.unique(residuals.frame[residuals.recoils]):
             columns.append(has.jitter * np.where(residuals.of_frame(frame), camera, 0.0))
         return np.array(columns)

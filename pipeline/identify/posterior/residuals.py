@@ -107,7 +107,7 @@ class Residuals:
     def _bin(self, reference: np.ndarray) -> None:
         episode = self.episode
         place = np.append(0, np.cumsum(self._edges)) / self._edges.sum()
-        found = []
+        binned = []
         for number in self.rule.frames(episode):
             cloud = episode.clouds[number]
             if len(cloud) < LEAST_POINTS:
@@ -137,14 +137,14 @@ class Residuals:
             # what bending and tube add to a bin's mean point, as they do at the reference
             bias = (mean - foot_of_mean) - seen
             frames = np.full(len(good), number)
-            found.append((frames, good, edge_of_mean, mean, depth, np.cross(along, depth), bias))
-        if not found:
+            binned.append((frames, good, edge_of_mean, mean, depth, np.cross(along, depth), bias))
+        if not binned:
             raise UserError(
                 f"episode of {episode.band}: no picture of the drawn band or of its recoil shows"
                 f" {LEAST_POINTS} points of it; look at `sling check --sheet`, and at the keys of"
                 " `cloud` in params.yaml"
             )
-        columns = zip(*found, strict=True)
+        columns = zip(*binned, strict=True)
         self.frame, self.bin, edge, self.point, self.depth, self.side, bias = (
             np.concatenate(column) for column in columns
         )

@@ -41,5 +41,5 @@ def load_sling(
 
 def sling_of_method(params: Params, band: str, method: str, root: str | Path = ".") -> ClampedBand:
     """A band as a method of params.yaml takes it: with its law, mounted or not."""
-    about = params.methods[method]
-    return load_sling(params, band, root, about.law, mounted=about.mounting)
+    method_params = params.methods[method]
+    return load_sling(params, band, root, method_params.law, mounted=method_params.mounting)

@@ -97,12 +97,12 @@ class PosteriorFile(JsonRecord):
 
     @model_validator(mode="after")
     def _a_column_each(self) -> PosteriorFile:
-        known = self.names in [
+        complete = self.names in [
             [*THETA, *law, *EXTRA[:count]]
             for law in LAWS.values()
             for count in range(len(EXTRA) + 1)
         ]
-        if self.samples and not (known and {*map(len, self.samples)} == {len(self.names)}):
+        if self.samples and not (complete and {*map(len, self.samples)} == {len(self.names)}):
             raise refusal("samples: must have a column for each of `names`, which are those of θ")
         return self
 

@@ -37,13 +37,13 @@ class Region:
     members: list[int]
 
 
-def regions_asked(about: MethodParams, optimizer: OptimizerParams) -> int:
+def regions_asked(method_params: MethodParams, optimizer: OptimizerParams) -> int:
     """How many regions params.yaml's `methods.<name>` and `optimizer` ask for."""
-    return about.k_top or optimizer.k_top
+    return method_params.k_top or optimizer.k_top
 
 
 def regions_of(
-    about: MethodParams, optimizer: OptimizerParams, history
+    method_params: MethodParams, optimizer: OptimizerParams, history
 ) -> tuple[list[Region], int]:
     """Where a method's refinement begins, and how many regions were asked for.
 
@@ -56,7 +56,10 @@ def regions_of(
         UserError: As `find_regions`.
     """
     settings = {name: getattr(optimizer, name) for name in ("k_nn", "delta")}
-    settings |= {"k_top": regions_asked(about, optimizer), "covariance": about.covariance}
+    settings |= {
+        "k_top": regions_asked(method_params, optimizer),
+        "covariance": method_params.covariance,
+    }
     return find_regions(history.unit, history.total, **settings), settings["k_top"]
 
 
@@ -133,8 +136,8 @@ class RegionsFile(JsonRecord):
     @model_validator(mode="after")
     def _a_number_for_each_name(self) -> RegionsFile:
         count = len(self.names)
-        for one in self.clusters:
-            if [len(one.mu), *map(len, one.Sigma)] != [count] * (1 + count):
+        for cluster in self.clusters:
+            if [len(cluster.mu), *map(len, cluster.Sigma)] != [count] * (1 + count):
                 raise refusal(f"clusters: mu must have {count} numbers, Sigma {count} rows of them")
         return self
 
@@ -142,9 +145,9 @@ class RegionsFile(JsonRecord):
 def save_regions(path: Path, names: tuple[str, ...], regions: list[Region], requested: int) -> None:
     """Write a `RegionsFile` with its axes' `names`, and how many regions were asked for."""
     clusters = [
-        {"mu": one.mu.tolist(), "Sigma": one.sigma.tolist(), "loss": one.loss}
-        | {"members": one.members}
-        for one in regions
+        {"mu": region.mu.tolist(), "Sigma": region.sigma.tolist(), "loss": region.loss}
+        | {"members": region.members}
+        for region in regions
     ]
     write_json(path, {"names": list(names), "asked": requested, "clusters": clusters})
 
@@ -153,7 +156,7 @@ def load_regions(path: Path) -> tuple[list[Region], list[str]]:
     """The regions of such a file, and the names of their axes. Raises NotMade."""
     read = read_json(path, RegionsFile)
     regions = [
-        Region(np.array(one.mu), np.array(one.Sigma), one.loss, one.members)
-        for one in read.clusters
+        Region(np.array(cluster.mu), np.array(cluster.Sigma), cluster.loss, cluster.members)
+        for cluster in read.clusters
     ]
     return regions, read.names

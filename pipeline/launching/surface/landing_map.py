@@ -166,8 +166,8 @@ def validation(landing_map: LandingMap, targets: tuple[float, float]) -> dict:
     """Interpolation error [m] on a map's random draws: over the box, and where targets lie."""
     simulated = landing_map.checks[:, 2]
     error = np.abs(landing_map(landing_map.checks[:, :2]).landing_y - simulated)
-    known = np.isfinite(error)
-    near = known & (simulated >= targets[0]) & (simulated <= targets[1])
+    finite = np.isfinite(error)
+    near = finite & (simulated >= targets[0]) & (simulated <= targets[1])
 
     def summary(chosen: np.ndarray) -> dict:
         if not chosen.any():
@@ -178,4 +178,4 @@ def validation(landing_map: LandingMap, targets: tuple[float, float]) -> dict:
             "max_error_m": float(error[chosen].max()),
         }
 
-    return {"box": summary(known), "target_range": summary(near)}
+    return {"box": summary(finite), "target_range": summary(near)}

@@ -57,8 +57,8 @@ class ResponseSurface:
         """
         self.grid, self.max_force = grid, max_force
         self.low, self.high = (np.array([axis[end] for axis in grid]) for end in (0, -1))
-        known = sorted(set(failure.flat) - {NO_FAILURE})
-        self.reasons = [NO_FAILURE, TOO_MUCH_FORCE, OUTSIDE, *known]
+        failures = sorted(set(failure.flat) - {NO_FAILURE})
+        self.reasons = [NO_FAILURE, TOO_MUCH_FORCE, OUTSIDE, *failures]
         code = np.vectorize(self.reasons.index, otypes=[int])(failure)
         self._cell = np.max([code[:-1, :-1], code[1:, :-1], code[:-1, 1:], code[1:, 1:]], axis=0)
         self._landing, self._force = self._spline(landing_y), self._spline(hold_force)
@@ -90,15 +90,15 @@ def _continued(values: np.ndarray) -> np.ndarray:
     """Failed nodes filled by a smooth continuation, so that they do not disturb their neighbours;
     no answer is read from a cell that they touch.
     """
-    known = np.isfinite(values)
-    if not known.any():
+    finite = np.isfinite(values)
+    if not finite.any():
         return np.zeros(values.shape)
-    if known.all():
+    if finite.all():
         return values
     nodes = np.stack(list(np.indices(values.shape)), -1).astype(float)
     continuation = RBFInterpolator(
-        nodes[known], values[known], neighbors=min(24, int(known.sum())), kernel="linear"
+        nodes[finite], values[finite], neighbors=min(24, int(finite.sum())), kernel="linear"
     )
     filled = values.copy()
-    filled[~known] = continuation(nodes[~known])
+    filled[~finite] = continuation(nodes[~finite])
     return filled

@@ -29,7 +29,7 @@ def asked_of_the_hand(
         return None
     sling, theta = calibrated(params, band, content), parameters_of(content)
     longer = replace(setup, history=replace(setup.history, pause=setup.history.pause + 1))
-    landings = [launch(sling, one, theta, draw).landing_y[0] for one in (setup, longer)]
+    landings = [launch(sling, variant, theta, draw).landing_y[0] for variant in (setup, longer)]
     moved = float(np.diff(landings)[0])
     return {
         "pull_time_s": setup.history.pull_time,

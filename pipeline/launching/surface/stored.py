@@ -95,7 +95,7 @@ class Stored:
 
     def _projectile(self) -> tuple[float, float]:
         """Where the projectile starts (y, z) [m], as the policy was trained with."""
-        about = self.card()["projectile"]
-        if about is None:
+        projectile = self.card()["projectile"]
+        if projectile is None:
             raise NotMade(self.folder / "card.json", "lacks the policy's input `projectile`")
-        return about["trained_at"]
+        return projectile["trained_at"]

@@ -89,10 +89,13 @@ class ScoresFile(JsonRecord):
 
 def save_scores(path: Path, launches: Sequence[Measured]) -> None:
     """Write a `ScoresFile`."""
-    write_json(path, {"launches": [vars(one) for one in launches]})
+    write_json(path, {"launches": [vars(launch) for launch in launches]})
 
 
 def load_scores(path: Path) -> list[Measured]:
     """The launches of a `ScoresFile`. Raises NotMade."""
     read = read_json(path, ScoresFile)
-    return [Measured(one.draw, one.landing, one.target, one.method) for one in read.launches]
+    return [
+        Measured(launch.draw, launch.landing, launch.target, launch.method)
+        for launch in read.launches
+    ]

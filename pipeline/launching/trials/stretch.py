@@ -22,7 +22,9 @@ def stretch_of(points: np.ndarray, fork_width: float, rest_length: float) -> np.
 def recorded_stretch(episodes: Iterable[Episode], fork_width: float, rest_length: float) -> float:
     """The largest stretch that the recordings show."""
     held = [
-        one.position[(one.time >= one.grasp_time) & (one.time <= one.release_time)]
-        for one in episodes
+        episode.position[
+            (episode.time >= episode.grasp_time) & (episode.time <= episode.release_time)
+        ]
+        for episode in episodes
     ]
     return float(stretch_of(np.concatenate(held), fork_width, rest_length).max())

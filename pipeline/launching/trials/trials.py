@@ -117,12 +117,15 @@ class Batch:
 
 def scored(launches: Sequence[Measured], method: str) -> list[Batch]:
     """The user's launches that say something about a method's predictions, if there are any."""
-    chosen = [one for one in launches if one.method in ("", method)]
+    chosen = [launch for launch in launches if launch.method in ("", method)]
     if not chosen:
         return []
-    landing = [one.landing for one in chosen]
+    landing = [launch.landing for launch in chosen]
     failure = [None if y is not None else "did not land" for y in landing]
-    draws, targets = np.array([one.draw for one in chosen]), [one.target for one in chosen]
+    draws, targets = (
+        np.array([launch.draw for launch in chosen]),
+        [launch.target for launch in chosen],
+    )
     return [Batch("measured", draws, targets, landing, failure)]
 
 
@@ -140,9 +143,9 @@ def launched(batch: Batch, launch: Callable) -> Batch:
     """
     with Pool() as pool:
         tried = list(pool.map(launch, batch.draws, range(len(batch.draws))))
-    landing = [one.landing_y if np.isfinite(one.landing_y) else None for one in tried]
+    landing = [trial.landing_y if np.isfinite(trial.landing_y) else None for trial in tried]
     names = ("failure", "hold_force", "flight")
-    column_values = {name: [getattr(one, name) for one in tried] for name in names}
+    column_values = {name: [getattr(trial, name) for trial in tried] for name in names}
     return replace(batch, kind="virtual", landing=landing, **column_values)
 
 
@@ -196,7 +199,7 @@ def table(
     def each(name: str) -> list:
         return [getattr(batch, name) for batch in batches for _ in batch.draws]
 
-    def known(values: np.ndarray | list) -> pa.Array:
+    def finite_or_none(values: np.ndarray | list) -> pa.Array:
         return pa.array(values, pa.float64(), from_pandas=True)
 
     force = zip(every("hold_force"), predicted.hold_force, strict=True)
@@ -208,18 +211,23 @@ def table(
         "trial": [number for batch in batches for number in _counted(batch.targets)],
         "draw_y": [y for y, _ in every("draws")],
         "draw_z": [z for _, z in every("draws")],
-        "predicted_y": known(predicted.landing_y),
-        "predicted_low": known(intervals[:, 0]),
-        "predicted_high": known(intervals[:, 1]),
+        "predicted_y": finite_or_none(predicted.landing_y),
+        "predicted_low": finite_or_none(intervals[:, 0]),
+        "predicted_high": finite_or_none(intervals[:, 1]),
         "predicted_failure": predicted.failure,
-        "predicted_leave_y": known(predicted.separation_y),
-        "predicted_leave_z": known(predicted.separation_z),
-        "predicted_speed": known(predicted.speed),
-        "predicted_angle": known(predicted.angle),
+        "predicted_leave_y": finite_or_none(predicted.separation_y),
+        "predicted_leave_z": finite_or_none(predicted.separation_z),
+        "predicted_speed": finite_or_none(predicted.speed),
+        "predicted_angle": finite_or_none(predicted.angle),
         "landing_y": every("landing"),
         "flight_y": [None if way is None else way[:, 0] for way in every("flight")],
         "flight_z": [None if way is None else way[:, 1] for way in every("flight")],
-        "hold_force": known([theirs if own is None else own for own, theirs in force]),
+        "hold_force": finite_or_none(
+            [
+                theirs if measured_force is None else measured_force
+                for measured_force, theirs in force
+            ]
+        ),
         "failure": every("failure"),
         "stretch": stretch,
         "recorded_stretch": [recorded] * len(stretch),

@@ -50,12 +50,12 @@ def findings(done: Processed) -> Iterator[Finding]:
     hold = hold_of(done)
     yield from _of_stiffness(hold)
     ways = ("lifts", "presses down"), ("pulls to the right", "pulls to the left")
-    about = "out of its plane", "off the middle of its strands"
+    directions = "out of its plane", "off the middle of its strands"
     for k, force in enumerate((hold.lift, hold.aside)):
         angle, error = float(abs(hold.angles[k])), float(hold.errors[k])
         if angle > SURE * error:
             what = f"the band {ways[k][int(force < 0)]} the hand by {abs(force):.1f} N,"
-            what += f" {np.degrees(angle):.1f} ± {np.degrees(error):.1f} degrees {about[k]}"
+            what += f" {np.degrees(angle):.1f} ± {np.degrees(error):.1f} degrees {directions[k]}"
             refused = angle > SURE * error + ASTRAY
             yield Finding(DIRECTION.name, what, DIRECTION.remedy, refused)
 

@@ -27,17 +27,20 @@ UNDERSTOOD = Check(
     "one of them is not there or cannot be determined",
     "as the reason says (docs/faq.md)",
 )
-CHECKS: tuple[Check, ...] = (*(check for one in CONCERNS for check in one.CHECKS), UNDERSTOOD)
+CHECKS: tuple[Check, ...] = (
+    *(check for concern in CONCERNS for check in concern.CHECKS),
+    UNDERSTOOD,
+)
 
 
 def findings_of(done: Processed) -> list[Finding]:
     """Of one pull, in the order of the table; what refuses it is the last, for more may follow."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for concern in CONCERNS:
         try:
-            found += concern.findings(done)
+            findings += concern.findings(done)
         except UserError as error:
-            found.append(Finding(UNDERSTOOD.name, str(error), "", refused=True))
-        if any(one.refused for one in found):
+            findings.append(Finding(UNDERSTOOD.name, str(error), "", refused=True))
+        if any(finding.refused for finding in findings):
             break
-    return found
+    return findings

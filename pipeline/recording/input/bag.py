@@ -41,8 +41,8 @@ def parts_of(path: Path) -> list[Path]:
         if path.is_dir():
             return _in_folder(path)
         _expect_file(path)
-        found = NUMBERED.fullmatch(_stem(path))
-        return (found and _beside(path, found[1])) or [path]
+        numbered = NUMBERED.fullmatch(_stem(path))
+        return (numbered and _beside(path, numbered[1])) or [path]
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror})") from error
 
@@ -66,7 +66,7 @@ def missing_parts(path: Path) -> list[str]:
         folder = parts[0].parent
         gone = [name for name in _listed(folder) if not _there(folder / name).is_file()]
         return [f"{name}, which {METADATA} lists, is missing" for name in gone]
-    numbers = [_number(one) for one in parts]
+    numbers = [_number(part) for part in parts]
     if len(parts) < 2:
         return []
     gone = sorted({*range(max(numbers) + 1)} - {*numbers})
@@ -75,14 +75,14 @@ def missing_parts(path: Path) -> list[str]:
 
 def once(paths: Iterable[Path]) -> list[Path]:
     """Each recording once, where some of the files are parts of one: the first that names it."""
-    found: list[Path] = []
+    unique: list[Path] = []
     seen: set[Path] = set()
     for path in paths:
         parts = parts_of(path)
         if len(parts) == 1 or parts[0] not in seen:
-            found.append(path)
+            unique.append(path)
         seen.update(parts)
-    return found
+    return unique
 
 
 def name_of(path: Path) -> str:
@@ -90,17 +90,19 @@ def name_of(path: Path) -> str:
     path = Path(path)
     if path.is_dir():
         return path.resolve().name.removesuffix(SUFFIX)
-    found = NUMBERED.fullmatch(_stem(path))
-    return found[1] if found and len(parts_of(path)) > 1 else _stem(path)
+    numbered = NUMBERED.fullmatch(_stem(path))
+    return numbered[1] if numbered and len(parts_of(path)) > 1 else _stem(path)
 
 
 def sha256(path: Path) -> str:
     """Of the file, also where it is a bag's only one; of several parts, of their hashes."""
-    found = []
+    digests = []
     for part in parts_of(path):
         with part.open("rb") as file:
-            found.append(hashlib.file_digest(file, "sha256").hexdigest())
-    return found[0] if len(found) == 1 else hashlib.sha256("\n".join(found).encode()).hexdigest()
+            digests.append(hashlib.file_digest(file, "sha256").hexdigest())
+    return (
+        digests[0] if len(digests) == 1 else hashlib.sha256("\n".join(digests).encode()).hexdigest()
+    )
 
 
 def _expect_file(path: Path) -> None:
@@ -130,7 +132,7 @@ def _in_folder(folder: Path) -> list[Path]:
         )
     if len(files) == 1:
         return files
-    stems = {found[1] for file in files if (found := NUMBERED.fullmatch(_stem(file)))}
+    stems = {numbered[1] for file in files if (numbered := NUMBERED.fullmatch(_stem(file)))}
     parts = sorted(files, key=_number)
     if len(stems) == 1 and min(map(_number, files)) >= 0 and _follow(parts):
         return parts
@@ -141,9 +143,9 @@ def _in_folder(folder: Path) -> list[Path]:
 def _beside(path: Path, stem: str) -> list[Path] | None:
     """All parts of the split bag that this file is of; None where it is of none."""
     parts = [
-        one
-        for one in _files(path.parent)
-        if (found := NUMBERED.fullmatch(_stem(one))) and found[1] == stem
+        file
+        for file in _files(path.parent)
+        if (numbered := NUMBERED.fullmatch(_stem(file))) and numbered[1] == stem
     ]
     if len(parts) < 2:
         return None
@@ -174,8 +176,8 @@ def _there(file: Path) -> Path:
 
 
 def _number(file: Path) -> int:
-    found = NUMBERED.fullmatch(_stem(file))
-    return int(found[2]) if found else -1
+    numbered = NUMBERED.fullmatch(_stem(file))
+    return int(numbered[2]) if numbered else -1
 
 
 def _listed(folder: Path) -> list[str]:
@@ -184,13 +186,13 @@ def _listed(folder: Path) -> list[str]:
     try:
         content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
         names = content["rosbag2_bagfile_information"]["relative_file_paths"]
-        found = [printable(Path(str(name)).name) for name in names]
+        listed = [printable(Path(str(name)).name) for name in names]
     except (YAMLError, ValueError, RecursionError, KeyError, TypeError) as error:
         raise UserError(
             f"{path}: is no metadata of a ROS 2 bag; without it the {SUFFIX} files are taken by"
             " number: remove it, or `ros2 bag reindex` the bag"
         ) from error
-    return sorted(dict.fromkeys(found), key=lambda name: _number(Path(name)))
+    return sorted(dict.fromkeys(listed), key=lambda name: _number(Path(name)))
 
 
 def _follow(parts: list[Path]) -> bool:

@@ -119,9 +119,9 @@ def outliers(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
     middle = np.median(stamp.astype(float))
     usual = median_filter(stamp - middle, 5, mode="nearest") + middle
     limit = max(FAR * 1e9, 10 * _period(stamp))
-    found = np.abs(stamp - usual) > limit
+    far_off = np.abs(stamp - usual) > limit
     for order in (1, -1):
-        retained = np.flatnonzero(~found)[::order]
+        retained = np.flatnonzero(~far_off)[::order]
         ways, by_log = np.abs(np.diff(stamp[retained])), np.abs(np.diff(log[retained]))
         far = ways > np.where(np.abs(ways - by_log) > limit / 2, limit, max(ALONE * 1e9, limit))
         begin = 0
@@ -129,8 +129,8 @@ def outliers(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
             if i + 1 - begin >= LEAST_AROUND or 2 * i > len(retained):
                 break
             begin = i + 1
-        found[retained[:begin]] = True
-    return found
+        far_off[retained[:begin]] = True
+    return far_off
 
 
 def arrival(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
@@ -154,10 +154,10 @@ def steps(stamp: np.ndarray, log: np.ndarray) -> list[Jump]:
     delay = log - stamp
     # Messages that had piled up come all at once; their delays say nothing of a clock.
     alone = np.diff(log, prepend=log[0] - period) > PILED * period
-    found: list[Jump] = []
+    jumps: list[Jump] = []
     for i in np.flatnonzero(np.abs(np.diff(delay)) > least) + 1:
         low = max(
-            np.searchsorted(arrived, arrived[i] - WINDOW * 1e9), found[-1].index if found else 0
+            np.searchsorted(arrived, arrived[i] - WINDOW * 1e9), jumps[-1].index if jumps else 0
         )
         high = np.searchsorted(arrived, arrived[i] + WINDOW * 1e9, side="right")
         before, after = (delay[a:b][alone[a:b]] for a, b in ((low, i), (i, high)))
@@ -169,10 +169,10 @@ def steps(stamp: np.ndarray, log: np.ndarray) -> list[Jump]:
         if min(abs(size), abs(way - period), abs(leap)) < least or (size > 0) != (way > period):
             continue  # delays, a gap, or log_time's own step
         agrees = abs(leap - size) < max(AGREE * 1e9, period / 4)
-        found.append(
+        jumps.append(
             Jump(int(i), int(log[i]), round(leap if agrees else size), period, exact and agrees)
         )
-    return found
+    return jumps
 
 
 def rewinds(stamp: np.ndarray, log: np.ndarray) -> list[Jump]:
@@ -181,7 +181,7 @@ def rewinds(stamp: np.ndarray, log: np.ndarray) -> list[Jump]:
     Chunks in another order go back too, but do not cover the same time twice. Nobody sets a clock
     as often as a file without any order goes back.
     """
-    found, back = [], _back(stamp, log)
+    jumps, back = [], _back(stamp, log)
     for i in back if len(back) < DISORDER else ():
         before = stamp[:i][stamp[:i] >= stamp[i]]
         after = stamp[i:][stamp[i:] <= stamp[i - 1]]
@@ -191,20 +191,20 @@ def rewinds(stamp: np.ndarray, log: np.ndarray) -> list[Jump]:
             period = _period(stamp)
             size = int(stamp[i] - stamp[i - 1]) - period
             exact = _spread(stamp) < EVEN * period
-            found.append(Jump(int(i), int(log[i]), size, period, exact))
-    return found
+            jumps.append(Jump(int(i), int(log[i]), size, period, exact))
+    return jumps
 
 
-def without(stamp: np.ndarray, found: list[Jump], base: int = 0) -> np.ndarray:
+def without(stamp: np.ndarray, jumps: list[Jump], base: int = 0) -> np.ndarray:
     """Stamps on the clock that segment `base` (0: before the first step) has."""
-    segment = segments(len(stamp), found)
-    leaps = np.concatenate([[0], np.cumsum([step.size for step in found], dtype=np.int64)])
+    segment = segments(len(stamp), jumps)
+    leaps = np.concatenate([[0], np.cumsum([step.size for step in jumps], dtype=np.int64)])
     return stamp - (leaps - leaps[base])[segment].astype(np.int64)
 
 
-def segments(count: int, found: list[Jump]) -> np.ndarray:
+def segments(count: int, jumps: list[Jump]) -> np.ndarray:
     """Number of steps before each message, shape (count,)."""
-    return np.searchsorted([step.index for step in found], np.arange(count), side="right")
+    return np.searchsorted([step.index for step in jumps], np.arange(count), side="right")
 
 
 def offset(
@@ -216,7 +216,7 @@ def offset(
     common = sorted({*mine} & {*others})
     if not common:
         return float((log - stamp).min() - (other_log - other_stamp).min()) * 1e-9
-    return float(np.median([mine[one] - others[one] for one in common])) * 1e-9
+    return float(np.median([mine[stamped] - others[stamped] for stamped in common])) * 1e-9
 
 
 def drift(stamp: np.ndarray, log: np.ndarray) -> tuple[float, float]:
@@ -233,13 +233,13 @@ def drift(stamp: np.ndarray, log: np.ndarray) -> tuple[float, float]:
     return float(slope), float(np.sqrt(noise / np.sum((time - time.mean()) ** 2)))
 
 
-def of_one_clock(found: list[tuple[float, float]]) -> tuple[float, float]:
+def of_one_clock(drifts: list[tuple[float, float]]) -> tuple[float, float]:
     """The mean of what topics say whose messages travel together, as `drift` has it."""
-    least = min(error for _, error in found)
-    weights = [max(error, 1e-9) ** -2.0 for _, error in found]
+    least = min(error for _, error in drifts)
+    weights = [max(error, 1e-9) ** -2.0 for _, error in drifts]
     if not np.isfinite(least):
         return 0.0, np.inf
-    return float(np.average([rate for rate, _ in found], weights=weights)), least
+    return float(np.average([rate for rate, _ in drifts], weights=weights)), least
 
 
 def _back(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:

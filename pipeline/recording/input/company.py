@@ -27,27 +27,34 @@ class Company:
         self.courses: dict[str, sets.Track | None] = {}
 
     def best(
-        self, role: str, found: list[Candidate], chosen: dict[str, Choice]
+        self, role: str, candidates: list[Candidate], chosen: dict[str, Choice]
     ) -> tuple[Candidate | None, str]:
         """The candidate, and in words what speaks against it; None where nothing fits `chosen`."""
         if role not in DEVICE:
-            return self._camera(role, found, chosen)
-        own = [one for one in found if not self._apart(one, chosen)]
-        if found and not own:
-            one, (other, of) = found[0], next(iter(self._strangers(found[0], chosen)))
-            return None, f"{one.topic} is of another device than the {other}'s topic {of}"
-        if not own:
+            return self._camera(role, candidates, chosen)
+        together = [candidate for candidate in candidates if not self._apart(candidate, chosen)]
+        if candidates and not together:
+            stranger, (other, of) = (
+                candidates[0],
+                next(iter(self._strangers(candidates[0], chosen))),
+            )
+            return None, f"{stranger.topic} is of another device than the {other}'s topic {of}"
+        if not together:
             return None, ""
-        live = own
-        if len(own) > 1:
-            live = [one for one in own if self._alive(one)] or own
-        meant = [one for one in live if not set(one.doubts) & set(COMMANDS)] or live
+        live = together
+        if len(together) > 1:
+            live = [candidate for candidate in together if self._alive(candidate)] or together
+        meant = [
+            candidate for candidate in live if not set(candidate.doubts) & set(COMMANDS)
+        ] or live
         if role == "wrench" and len(meant) > 1:
-            meant = [one for one in meant if self._falls(one)] or meant
+            meant = [candidate for candidate in meant if self._falls(candidate)] or meant
         elif role == "pose" and len(meant) > 1:
             meant = self._followed(meant, chosen["wrench"])
         elif role == "gripper" and len(meant) > 1:
-            meant = [one for one in meant if self._opens(one, chosen["wrench"])] or meant
+            meant = [
+                candidate for candidate in meant if self._opens(candidate, chosen["wrench"])
+            ] or meant
         best = max(meant, key=Candidate.merit)
         return best, self._tie(best, chosen) if role == "pose" else ""
 
@@ -68,16 +75,20 @@ class Company:
     @cached_property
     def sides(self) -> list[set[str]]:
         topics = [
-            (one.topic, one.kind) for role in DEVICE for one in self.fitting(role)[:MOST_TOPICS]
+            (candidate.topic, candidate.kind)
+            for role in DEVICE
+            for candidate in self.fitting(role)[:MOST_TOPICS]
         ]
         return sets.sides_of(dict.fromkeys(topics))
 
-    def _apart(self, one: Candidate, chosen: dict[str, Choice]) -> bool:
-        return any(True for _ in self._strangers(one, chosen))
+    def _apart(self, candidate: Candidate, chosen: dict[str, Choice]) -> bool:
+        return any(True for _ in self._strangers(candidate, chosen))
 
-    def _strangers(self, one: Candidate, chosen: dict[str, Choice]) -> Iterator[tuple[str, str]]:
+    def _strangers(
+        self, candidate: Candidate, chosen: dict[str, Choice]
+    ) -> Iterator[tuple[str, str]]:
         """Roles and topics that were chosen of another device."""
-        mine = one.topic, one.typical.frame
+        mine = candidate.topic, candidate.typical.frame
         for role, other in chosen.items():
             topic = other.channel.topic
             if sets.apart(mine, (topic, other.typical().frame), self.sides):
@@ -85,18 +96,18 @@ class Company:
 
     # What they say
 
-    def _course(self, one: Candidate | Choice) -> sets.Track | None:
-        choice = one.choice if isinstance(one, Candidate) else one
+    def _course(self, candidate: Candidate | Choice) -> sets.Track | None:
+        choice = candidate.choice if isinstance(candidate, Candidate) else candidate
         topic = choice.channel.topic
         if topic not in self.courses:
             self.courses[topic] = sets.course_of(choice.channel, choice.read)
         return self.courses[topic]
 
-    def _alive(self, one: Candidate) -> bool:
-        return sets.alive(one.choice.channel, one.choice.read)
+    def _alive(self, candidate: Candidate) -> bool:
+        return sets.alive(candidate.choice.channel, candidate.choice.read)
 
-    def _falls(self, one: Candidate) -> bool:
-        course = self._course(one)
+    def _falls(self, candidate: Candidate) -> bool:
+        course = self._course(candidate)
         return course is not None and sets.fall_of(course) is not None
 
     def _followed(self, hands: list[Candidate], wrench: Choice) -> list[Candidate]:
@@ -105,23 +116,25 @@ class Company:
         if force is None:
             return hands
         shares = []
-        for one in hands:
+        for hand in hands:
             course = (
-                None if one.choice.convert else sets.course_of(one.choice.channel, one.choice.read)
+                None
+                if hand.choice.convert
+                else sets.course_of(hand.choice.channel, hand.choice.read)
             )
             shares.append(sets.follows(force, course) if course else None)
         most = max([share for share in shares if share is not None], default=0.0)
         if most < LEAST_FOLLOWS:
             return hands
         return [
-            one
-            for one, share in zip(hands, shares, strict=True)
+            candidate
+            for candidate, share in zip(hands, shares, strict=True)
             if share is None or share >= sets.FOLLOWS * most
         ]
 
-    def _opens(self, one: Candidate, wrench: Choice) -> bool:
+    def _opens(self, candidate: Candidate, wrench: Choice) -> bool:
         """Whether its fingers move when the force falls."""
-        force, fingers = self._course(wrench), self._course(one)
+        force, fingers = self._course(wrench), self._course(candidate)
         if force is None or fingers is None:
             return False
         k = sets.fall_of(force)
@@ -147,20 +160,20 @@ class Company:
     # Cameras
 
     def _camera(
-        self, role: str, found: list[Candidate], chosen: dict[str, Choice]
+        self, role: str, candidates: list[Candidate], chosen: dict[str, Choice]
     ) -> tuple[Candidate | None, str]:
-        if len(found) < 2:
-            return (found[0] if found else None), ""
-        live = [one for one in found if self._alive(one)] or found
-        placed = [one for one in live if one.typical.frame in self.frames] or live
+        if len(candidates) < 2:
+            return (candidates[0] if candidates else None), ""
+        live = [candidate for candidate in candidates if self._alive(candidate)] or candidates
+        placed = [candidate for candidate in live if candidate.typical.frame in self.frames] or live
         if role == "depth":
             color = chosen["color"]
             topic, frame = color.channel.topic, color.typical().frame
-            near = {id(one): self._near(one, topic, frame) for one in placed}
+            near = {id(candidate): self._near(candidate, topic, frame) for candidate in placed}
             most = max(near.values())
             return max((o for o in placed if near[id(o)] == most), key=Candidate.merit), ""
         depths = self.fitting("depth")
-        paired = [one for one in placed if self._partner(one, depths)]
+        paired = [candidate for candidate in placed if self._partner(candidate, depths)]
         best = max(paired or placed, key=Candidate.merit)
         return best, self._other_camera(best, paired, depths)
 
@@ -174,13 +187,15 @@ class Company:
 
     def _other_camera(self, best: Candidate, colors: list[Candidate], depths: list[Candidate]):
         """In words, another camera with colour and depth of its own that would do as well."""
-        for one in colors:
-            if len(one.doubts) > len(best.doubts) or one.topic == best.topic:
+        for color in colors:
+            if len(color.doubts) > len(best.doubts) or color.topic == best.topic:
                 continue
             for depth in depths:
-                own = self._near(depth, one.topic, one.typical.frame)
-                if own > self._near(depth, best.topic, best.typical.frame) and self._alive(depth):
-                    return f"{one.topic} with {depth.topic} is a camera too"
+                transform = self._near(depth, color.topic, color.typical.frame)
+                if transform > self._near(depth, best.topic, best.typical.frame) and self._alive(
+                    depth
+                ):
+                    return f"{color.topic} with {depth.topic} is a camera too"
         return ""
 
 

@@ -78,12 +78,12 @@ def read_container(path: Path) -> Container:
     path = Path(path)
     parts, held = bag.parts_of(path), 0
     if len(parts) == 1:
-        one = _read(path, parts[0], held)[0]
-        return replace(one, losses=[*bag.missing_parts(path), *one.losses])
+        contents = _read(path, parts[0], held)[0]
+        return replace(contents, losses=[*bag.missing_parts(path), *contents.losses])
     read = []
     for part in parts:
-        one, held = _read(path, part, held)
-        read.append(one)
+        contents, held = _read(path, part, held)
+        read.append(contents)
     return _one_of(path, read)
 
 
@@ -100,18 +100,20 @@ def _read(path: Path, part: Path, held: int) -> tuple[Container, int]:
 def _one_of(path: Path, read: list[Container]) -> Container:
     """The parts of a bag as one recording; what is said of a part names it."""
     parts = bag.parts_of(path)
-    found: dict[tuple, Channel] = {}
+    channels: dict[tuple, Channel] = {}
     for container in read:
         for channel in container.channels:
-            one = found.setdefault(_kind(channel), replace(channel, log_times=[], payloads=[]))
-            one.log_times += channel.log_times
-            one.payloads += channel.payloads
+            merged = channels.setdefault(
+                _kind(channel), replace(channel, log_times=[], payloads=[])
+            )
+            merged.log_times += channel.log_times
+            merged.payloads += channel.payloads
     named = list(zip(parts, read, strict=True))
-    losses = [f"{part.name}: {loss}" for part, one in named for loss in one.losses]
+    losses = [f"{part.name}: {loss}" for part, contents in named for loss in contents.losses]
     whole = f"all {len(parts)} parts of the bag were read, from {parts[0].name} on"
     notes = [] if path.is_dir() else [whole]
-    notes += dict.fromkeys(note for one in read for note in one.notes)
-    return Container(path, list(found.values()), [*bag.missing_parts(path), *losses], notes)
+    notes += dict.fromkeys(note for contents in read for note in contents.notes)
+    return Container(path, list(channels.values()), [*bag.missing_parts(path), *losses], notes)
 
 
 def _kind(channel: Channel) -> tuple:
@@ -149,9 +151,9 @@ class _Contents:
         for record in self.aside:
             self._settle(record)
         trusted = self._summary_holds()
-        for one in self.summary if trusted else ():
-            if isinstance(one, kinds.Schema | kinds.Channel):
-                self._name(one)
+        for entry in self.summary if trusted else ():
+            if isinstance(entry, kinds.Schema | kinds.Channel):
+                self._name(entry)
         channels, orphans = self._joined()
         losses = [*self._losses(), *(self._compared() if trusted else ()), *orphans]
         return Container(self.path, channels, losses, self._notes(trusted))
@@ -200,8 +202,8 @@ class _Contents:
             self._name(content)
         elif opcode == Opcode.CHANNEL:
             self._name(content)
-            known = self.definitions[content.id]
-            if _meaning(known) != _meaning(replace(content, topic=printable(content.topic))):
+            definition = self.definitions[content.id]
+            if _meaning(definition) != _meaning(replace(content, topic=printable(content.topic))):
                 self.ambiguous.setdefault(content.id, 0)
         elif opcode == Opcode.CHUNK:
             try:
@@ -209,12 +211,16 @@ class _Contents:
             except Damaged:
                 self.dropped.append((content.message_start_time, content.message_end_time))
 
-    def _name(self, one: kinds.Schema | kinds.Channel) -> None:
+    def _name(self, definition: kinds.Schema | kinds.Channel) -> None:
         """The first schema or channel of its number counts, by a name that can be shown."""
-        if isinstance(one, kinds.Schema):
-            self.schemas.setdefault(one.id, replace(one, name=printable(one.name)))
+        if isinstance(definition, kinds.Schema):
+            self.schemas.setdefault(
+                definition.id, replace(definition, name=printable(definition.name))
+            )
         else:
-            self.definitions.setdefault(one.id, replace(one, topic=printable(one.topic)))
+            self.definitions.setdefault(
+                definition.id, replace(definition, topic=printable(definition.topic))
+            )
 
     def _open(self, data: bytes) -> None:
         """The records of a chunk. Raises Damaged."""
@@ -233,10 +239,10 @@ class _Contents:
         if number in self.ambiguous:
             self.ambiguous[number] += 1
             return
-        known = self.definitions.get(number)
-        schema = self.schemas.get(known.schema_id) if known else None
+        definition = self.definitions.get(number)
+        schema = self.schemas.get(definition.schema_id) if definition else None
         idle = schema and schema.name and not PLAYS.search(schema.name)
-        idle = idle or (self.shed and known and IDLE.search(known.topic.lower()))
+        idle = idle or (self.shed and definition and IDLE.search(definition.topic.lower()))
         payload = b"" if idle else data[start + of.MESSAGE.size : end]
         channel = self.channels.setdefault(number, Channel("", NO_SCHEMA, ""))
         channel.log_times.append(log_time)
@@ -248,8 +254,8 @@ class _Contents:
         if self.held > MOST and not self.shed:
             self.shed = True
             for number, channel in self.channels.items():
-                known = self.definitions.get(number)
-                if known and IDLE.search(known.topic.lower()):
+                definition = self.definitions.get(number)
+                if definition and IDLE.search(definition.topic.lower()):
                     self.held -= sum(map(len, channel.payloads))
                     channel.payloads[:] = [b""] * len(channel.payloads)
         if self.held > MOST:
@@ -262,29 +268,37 @@ class _Contents:
 
     def _joined(self) -> tuple[list[Channel], list[str]]:
         """Channels by topic, and in words what could not be joined."""
-        found: dict[tuple, Channel] = {}
+        by_key: dict[tuple, Channel] = {}
         losses = []
         for number, channel in self.channels.items():
-            known, count = self.definitions.get(number), counted(len(channel.payloads))
-            if known is None:
+            definition, count = self.definitions.get(number), counted(len(channel.payloads))
+            if definition is None:
                 losses.append(f"{count} of channel {number} dropped: no record says what it is")
                 continue
-            schema = self.schemas.get(known.schema_id)
-            if schema is None and known.schema_id:
-                losses.append(f"{count} of {known.topic} dropped: its schema is missing")
+            schema = self.schemas.get(definition.schema_id)
+            if schema is None and definition.schema_id:
+                losses.append(f"{count} of {definition.topic} dropped: its schema is missing")
                 continue
-            encoding = known.message_encoding
-            schema = schema or guessed(known.topic, encoding, channel.payloads) or NO_SCHEMA
-            key = (known.topic, schema.name, schema.encoding, schema.data, known.message_encoding)
-            one = found.setdefault(key, Channel(known.topic, schema, known.message_encoding))
-            one.log_times += channel.log_times
-            one.payloads += channel.payloads
+            encoding = definition.message_encoding
+            schema = schema or guessed(definition.topic, encoding, channel.payloads) or NO_SCHEMA
+            key = (
+                definition.topic,
+                schema.name,
+                schema.encoding,
+                schema.data,
+                definition.message_encoding,
+            )
+            merged = by_key.setdefault(
+                key, Channel(definition.topic, schema, definition.message_encoding)
+            )
+            merged.log_times += channel.log_times
+            merged.payloads += channel.payloads
         for number, count in self.ambiguous.items():
             topic = self.definitions[number].topic
             losses.append(
                 f"channel {number} is {topic} and then another: {counted(count)} dropped since"
             )
-        return list(found.values()), losses
+        return list(by_key.values()), losses
 
     def _summary_holds(self) -> bool:
         """Whether the summary can be believed."""
@@ -335,7 +349,9 @@ class _Contents:
         notes = []
         if self.shed:
             left = [
-                one.topic for one in self.definitions.values() if IDLE.search(one.topic.lower())
+                definition.topic
+                for definition in self.definitions.values()
+                if IDLE.search(definition.topic.lower())
             ]
             notes.append(
                 f"more than {MOST / 2**30:.0f} GiB of messages: without those of"
@@ -359,7 +375,7 @@ class _Contents:
         far = start and start - self.data_end.end
         what = "missing from" if far > 0 else "too many in"
         losses = [f"{abs(far)} bytes are {what} the file"] if far else []
-        statistics = [one for one in self.summary if isinstance(one, kinds.Statistics)]
+        statistics = [entry for entry in self.summary if isinstance(entry, kinds.Statistics)]
         if not statistics:
             return losses
         wanted = statistics[-1].channel_message_counts
@@ -367,9 +383,11 @@ class _Contents:
         off = []
         for number in sorted({*wanted, *read}) if wanted else ():
             a, b = wanted.get(number, 0), read.get(number, 0)
-            known = self.definitions.get(number)
+            definition = self.definitions.get(number)
             if a != b:
-                off.append(f"{b} of {a} of {known.topic if known else f'channel {number}'}")
+                off.append(
+                    f"{b} of {a} of {definition.topic if definition else f'channel {number}'}"
+                )
         total = sum(read.values())
         if not off and total != statistics[-1].message_count:
             off.append(f"{total} of {statistics[-1].message_count}")
@@ -379,7 +397,9 @@ class _Contents:
 
     def _log_times(self) -> np.ndarray:
         """log_times [ns] without those that are damage."""
-        times = np.array([t for one in self.channels.values() for t in one.log_times], float)
+        times = np.array(
+            [t for channel in self.channels.values() for t in channel.log_times], float
+        )
         return times[np.abs(times - np.median(times)) < LONGEST] if len(times) else times
 
 

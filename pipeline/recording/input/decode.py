@@ -49,11 +49,11 @@ def decoder(channel: Channel) -> Decoder:
     schema = channel.schema
     by_name = channel.encoding == "cdr" and _says_nothing(schema)
     if not by_name and (schema.encoding, channel.encoding) not in DECODERS:
-        known = ", ".join(f"{a} with {b}" for a, b in DECODERS)
+        supported = ", ".join(f"{a} with {b}" for a, b in DECODERS)
         what = f"schema {schema.encoding!r}" if schema.encoding else "no schema"
         raise UserError(
             f"topic {channel.topic}: {what} with messages {channel.encoding!r} cannot be read,"
-            f" record one of: {known}"
+            f" record one of: {supported}"
         )
     most = LONGEST.get(channel.encoding, USUAL)
     try:

@@ -95,13 +95,13 @@ def depth(picture: Picture) -> np.ndarray:
 def grey(data: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """A grey PNG of this width and height to uint8, shape (H, W). Raises Undecodable."""
     try:
-        found, mode, format = header(data)
+        pixels, mode, format = header(data)
     except Undecodable as error:
         raise Undecodable(f"is not a grey PNG of 8 bits or 1: {error}") from error
     if mode not in ("L", "1") or format != "PNG":
         raise Undecodable("is not a grey PNG of 8 bits or 1")
-    if found != size:
-        raise Undecodable("is of {} x {} pixels, not of {} x {}".format(*found, *size))
+    if pixels != size:
+        raise Undecodable("is of {} x {} pixels, not of {} x {}".format(*pixels, *size))
     return unpacked(data, cv2.IMREAD_GRAYSCALE, "png")
 
 
@@ -210,5 +210,5 @@ def _metres(depth: np.ndarray) -> np.ndarray:
         return np.maximum(depth, 0).astype(np.float32) / 1000
     if depth.dtype not in METRES.values():
         raise Unsupported(f"depth image of {depth.dtype}, {USE}")
-    known = np.isfinite(depth) & (depth > 0) & (depth < FARTHEST)
-    return np.where(known, depth, 0).astype(np.float32)
+    measured = np.isfinite(depth) & (depth > 0) & (depth < FARTHEST)
+    return np.where(measured, depth, 0).astype(np.float32)

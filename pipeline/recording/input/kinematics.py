@@ -137,11 +137,11 @@ def _joints(path: Path) -> list[Joint]:
         raise UserError(f"setup.urdf: {path}: not valid XML ({error})") from error
     if any("xacro" in element.tag for element in robot.iter()):
         raise UserError(f"setup.urdf: {path}: is a xacro, expand it (xacro in.xacro > out.urdf)")
-    joints = [one for one in robot.findall("joint") if one.find("parent") is not None]
+    joints = [element for element in robot.findall("joint") if element.find("parent") is not None]
     if robot.tag != "robot" or not joints:
         raise UserError(f"setup.urdf: {path}: no robot with joints in it")
     try:
-        return [_joint(one) for one in joints]
+        return [_joint(joint) for joint in joints]
     except (KeyError, ValueError) as error:
         raise UserError(f"setup.urdf: {path}: bad joint ({error})") from error
 
@@ -197,8 +197,8 @@ def _tip(path: Path, links: list[str], parents: dict[str, Joint]) -> str:
     named = [link for link in links if any(("_" + link.lower()).endswith("_" + t) for t in TIPS)]
     if len(named) != 1:
         ends = {joint.parent for joint in parents.values()}
-        found = named or [link for link in links if link not in ends]
+        tips = named or [link for link in links if link not in ends]
         raise UserError(
-            f"setup.tip_link: name the link at the tool centre point of {path}: {', '.join(found)}"
+            f"setup.tip_link: name the link at the tool centre point of {path}: {', '.join(tips)}"
         )
     return named[0]

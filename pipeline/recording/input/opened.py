@@ -47,7 +47,9 @@ def opened(path: Path) -> Iterator[BinaryIO]:
     with path.open("rb") as file:
         first = file.read(32)
         file.seek(0)
-        unpack = next((one for magic, one in PACKED.items() if first.startswith(magic)), None)
+        unpack = next(
+            (unpacker for magic, unpacker in PACKED.items() if first.startswith(magic)), None
+        )
         if unpack is None:
             if not first.startswith(MAGIC):
                 raise UserError(f"{path}: {_what(first, path)}")

@@ -44,8 +44,8 @@ class Header(NamedTuple):
 def header(data: np.ndarray) -> Header:
     """Without unpacking. Raises Undecodable."""
     start = data[:40].tobytes()
-    if found := WEBP.match(start):  # Pillow would ask for all of its pixels at once
-        return Header(_webp_size(found[1], start[found.end() :]), "RGB", "WEBP")
+    if match := WEBP.match(start):  # Pillow would ask for all of its pixels at once
+        return Header(_webp_size(match[1], start[match.end() :]), "RGB", "WEBP")
     try:
         with Image.open(io.BytesIO(data.data), formats=FORMATS) as image:
             return Header(image.size, image.mode, str(image.format))
@@ -91,8 +91,8 @@ def _jpeg_end(data: bytes) -> int:
         Undecodable: It has no end, and OpenCV would fill it up with grey; or scans without end.
     """
     at, scans = len(JPEG), 0
-    while found := MARKER.search(data, at):
-        marker, at = found[1][0], found.end()
+    while match := MARKER.search(data, at):
+        marker, at = match[1][0], match.end()
         if marker == END:
             return at
         if marker in BARE:

@@ -81,8 +81,8 @@ class Recording:
 
     @property
     def streams(self) -> dict[str, Stream[Any]]:
-        found = {role: getattr(self, role) for role in ROLES}
-        return {role: stream for role, stream in found.items() if stream}
+        by_role = {role: getattr(self, role) for role in ROLES}
+        return {role: stream for role, stream in by_role.items() if stream}
 
     def depth_picture(self, number: int) -> np.ndarray | None:
         """In metres, 0 where unknown, of the camera's size (H, W); None where it is damaged."""
@@ -126,9 +126,9 @@ def recording_of(
         transforms = transforms_of(container)
         chosen = choose(container, setup, transforms.frames)
         color_camera, depth_camera = (camera_of(chosen, role) for role in CAMERAS)
-        found = {role: chosen[role] for role in ROLES if role in chosen}
+        by_role = {role: chosen[role] for role in ROLES if role in chosen}
         late = late_by(delays)
-        streams, remarks = streams_of(found, late)
+        streams, remarks = streams_of(by_role, late)
     except UserError as error:
         raise explained(error, container.path, container.losses) from None
     lost = [f"{stream.topic}: {note}" for stream in streams.values() for note in stream.notes]
@@ -164,6 +164,6 @@ def explained(error: UserError, path: Path, losses: list[str], pull: str = "") -
     text = str(error).removeprefix(f"{path}: ")
     text = shortened(f"{pull}: {text}" if pull else text, LINE)
     text = text if str(path) in text else f"{path}: {text}"
-    shown = [shortened(one, LOSS) for one in losses[:SHOWN]]
+    shown = [shortened(loss, LOSS) for loss in losses[:SHOWN]]
     shown += ["and more"] * (len(losses) > SHOWN)
     return UserError(printable(f"{text} ({'; '.join(shown)})" if losses else text))

@@ -181,7 +181,7 @@ def joints_of(message: Message) -> dict[str, float]:
     """Position of each joint, of JointState, foxglove.JointStates or a Franka state."""
     message = getattr(message, "measured_joint_state", message)
     if hasattr(message, "joints"):
-        return {str(one.name): float(one.position) for one in message.joints}
+        return {str(joint.name): float(joint.position) for joint in message.joints}
     return dict(zip(map(str, message.name), map(float, message.position), strict=True))
 
 

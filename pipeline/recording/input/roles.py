@@ -61,11 +61,11 @@ class Choice:
 
     def typical(self) -> Reading:
         """The first message of the frame and kind that most have. Raises UserError."""
-        found, reason = readable(self.read, self.channel.payloads)
-        if not found:
+        messages, reason = readable(self.read, self.channel.payloads)
+        if not messages:
             raise UserError(f"{self.channel.topic} has fewer than two readable messages ({reason})")
-        kinds = [(one.frame, getattr(one.value, "kind", None)) for one in found]
-        return found[kinds.index(Counter(kinds).most_common(1)[0][0])]
+        kinds = [(message.frame, getattr(message.value, "kind", None)) for message in messages]
+        return messages[kinds.index(Counter(kinds).most_common(1)[0][0])]
 
 
 def readable(
@@ -245,8 +245,8 @@ def _gripper(channel: Channel, decode: Decoder, named: bool) -> Source | None:
 
 def _arm(channel: Channel, decode: Decoder, setup: SetupParams) -> Source | None:
     """Joint states through params' URDF."""
-    known = _joint_names(channel, decode)
-    arms = [some for some in known if not all(_has(FINGERS, name) for name in some)]
+    joint_names = _joint_names(channel, decode)
+    arms = [some for some in joint_names if not all(_has(FINGERS, name) for name in some)]
     if not arms:
         return None
     names = arms[0]
@@ -257,7 +257,7 @@ def _arm(channel: Channel, decode: Decoder, setup: SetupParams) -> Source | None
             " in setup.urdf"
         )
     chain = chain_of(setup.urdf, setup.tip_link)
-    if not any(set(chain.names) <= set(some) for some in known):
+    if not any(set(chain.names) <= set(some) for some in joint_names):
         lacks = ", ".join([name for name in chain.names if name not in names][:JOINTS_SHOWN])
         raise UserError(
             f"{channel.topic} lacks joint {lacks} of {setup.urdf}, it has {has}: check setup.urdf"
@@ -287,8 +287,8 @@ def _motion(channel: Channel, decode: Decoder, setup: SetupParams, read: Read) -
 def _joint_names(channel: Channel, decode: Decoder) -> list[tuple[str, ...]]:
     """Names in the first messages, the most frequent first. Raises UserError if there are none."""
     read = message_reader(decode, lambda message: tuple(of.joints_of(message)))
-    found, _ = readable(read, channel.payloads[:JOINT_TRIES], None)
-    names = [some for some, _ in Counter(found).most_common() if some]
+    messages, _ = readable(read, channel.payloads[:JOINT_TRIES], None)
+    names = [some for some, _ in Counter(messages).most_common() if some]
     if not names:
         raise UserError(f"{channel.topic} has fewer than two readable messages (no positions)")
     return names

@@ -77,20 +77,20 @@ def alive(channel: Channel, read: Callable[[bytes], Reading]) -> bool:
 
 def sides_of(topics: Iterable[tuple[str, str]]) -> list[set[str]]:
     """Words by which topics of one type differ that are otherwise alike; of (topic, type)."""
-    found = list(OPPOSITE)
+    pairs = list(OPPOSITE)
     for (a, kind), (b, other) in combinations(topics, 2):
-        one, two = _words(a), _words(b)
-        if kind != other or len(one) != len(two):
+        first, two = _words(a), _words(b)
+        if kind != other or len(first) != len(two):
             continue
-        apart = [{x, y} for x, y in zip(one, two, strict=True) if x != y]
-        if len(apart) == 1 and apart[0] not in found:
-            found.append(apart[0])
-    return found
+        apart = [{x, y} for x, y in zip(first, two, strict=True) if x != y]
+        if len(apart) == 1 and apart[0] not in pairs:
+            pairs.append(apart[0])
+    return pairs
 
 
-def apart(one: Iterable[str], other: Iterable[str], sides: Sequence[set[str]]) -> bool:
+def apart(first: Iterable[str], other: Iterable[str], sides: Sequence[set[str]]) -> bool:
     """Whether two topics are of different devices, by their names and their frames' names."""
-    a, b = ({word for name in names for word in _words(name)} for names in (one, other))
+    a, b = ({word for name in names for word in _words(name)} for names in (first, other))
     return any(a & side and b & side and not a & b & side for side in sides)
 
 
@@ -118,11 +118,11 @@ def follows(force: Track, hand: Track) -> float:
     edges = np.linspace(max(force.time[0], hand.time[0]), min(end, hand.time[-1]), STEPS + 1)
     if not edges[-1] > edges[0]:
         return 0.0
-    f, x = (_means(one, edges) for one in (force, hand))
-    known = np.isfinite(f).all(axis=1) & np.isfinite(x).all(axis=1)
-    if known.sum() < STEPS / 3:
+    f, x = (_means(series, edges) for series in (force, hand))
+    finite = np.isfinite(f).all(axis=1) & np.isfinite(x).all(axis=1)
+    if finite.sum() < STEPS / 3:
         return 0.0
-    df, dx = np.diff(f[known], axis=0), np.diff(x[known], axis=0)
+    df, dx = np.diff(f[finite], axis=0), np.diff(x[finite], axis=0)
     left = df - dx @ np.linalg.lstsq(dx, df, rcond=None)[0]
     total = float((df**2).sum())
     return max(0.0, 1.0 - float((left**2).sum()) / total) if total > 0 else 0.0

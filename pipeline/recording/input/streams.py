@@ -89,11 +89,11 @@ def streams_of(
                 raise
             notes.append(f"{error}: done without it")
     _take_rewinds_out(raw)
-    for one in raw.values():
-        one.late = int(np.count_nonzero(np.diff(one.stamp) < 0))
-        one.keep(clocks.arrival(one.stamp, one.log))
-        one.drop(clocks.outliers(one.stamp, one.log), "far off in time")
-        _take_bursts_out(one)
+    for series in raw.values():
+        series.late = int(np.count_nonzero(np.diff(series.stamp) < 0))
+        series.keep(clocks.arrival(series.stamp, series.log))
+        series.drop(clocks.outliers(series.stamp, series.log), "far off in time")
+        _take_bursts_out(series)
     _take_steps_out(raw)
     late = {} if late is None else late
     for role, seconds in late.items():
@@ -101,7 +101,7 @@ def streams_of(
             raw[role].stamp = raw[role].stamp - round(seconds * 1e9)
     _on_one_clock(raw, late)
     _at_one_rate(raw)
-    streams = {role: _sorted(one) for role, one in raw.items()}
+    streams = {role: _sorted(samples) for role, samples in raw.items()}
     origin = int(streams["wrench"].stamp[0])
     first = min(stream.stamp[0] for stream in streams.values())
     last = max(stream.stamp[-1] for stream in streams.values())
@@ -145,7 +145,7 @@ def _read(role: str, choice: Choice) -> Raw:
             raise UserError(f"topic {raw.topic} has no header stamps, record with time stamps")
         raw.stamp = log.copy()
         raw.notes.append("no header stamps: log_time is used")
-    raw.drop(np.array([one != frame for one in frames], bool), "in another frame")
+    raw.drop(np.array([other != frame for other in frames], bool), "in another frame")
     raw.drop(raw.stamp == 0, "without a stamp")
     if len(raw.stamp) < 2:
         reasons = f" ({_words(raw)})" if raw.lost else ""
@@ -155,11 +155,11 @@ def _read(role: str, choice: Choice) -> Raw:
 
 def _take_rewinds_out(raw: dict[str, Raw]) -> None:
     """Steps back of the machine's clock, stamps and log_time alike."""
-    for one, found in _agreed(raw, clocks.rewinds).items():
-        role = raw[one]
-        role.stamp = clocks.without(role.stamp, found)
-        role.log = clocks.without(role.log, found)
-        for step in found:
+    for series, jumps in _agreed(raw, clocks.rewinds).items():
+        role = raw[series]
+        role.stamp = clocks.without(role.stamp, jumps)
+        role.log = clocks.without(role.log, jumps)
+        for step in jumps:
             at, size = (role.log[step.index] - role.log[0]) * 1e-9, step.size * 1e-9
             role.notes.append(
                 f"step of its machine's clock of {size:+.4f} s at {at:.2f} s taken out"
@@ -183,42 +183,42 @@ def _take_bursts_out(raw: Raw) -> None:
 
 def _take_steps_out(raw: dict[str, Raw]) -> None:
     """Steps of the stamps' clock alone; the segment that fits the other topics is right."""
-    found = _agreed(raw, clocks.steps)
-    start = min(one.log.min() for one in raw.values())
+    agreed = _agreed(raw, clocks.steps)
+    start = min(series.log.min() for series in raw.values())
     usual = {}
-    for role, one in raw.items():
-        segment = clocks.segments(len(one.stamp), found.get(role, []))
+    for role, samples in raw.items():
+        segment = clocks.segments(len(samples.stamp), agreed.get(role, []))
         longest = np.argmax(np.bincount(segment))
-        usual[role] = (one.log - one.stamp)[segment == longest].min()
-    for role, jumps in found.items():
-        one = raw[role]
-        segment = clocks.segments(len(one.stamp), jumps)
-        least = [(one.log - one.stamp)[segment == k].min() for k in range(len(jumps) + 1)]
-        others = np.median([usual[other] for other in raw if other not in found] or [usual[role]])
+        usual[role] = (samples.log - samples.stamp)[segment == longest].min()
+    for role, jumps in agreed.items():
+        samples = raw[role]
+        segment = clocks.segments(len(samples.stamp), jumps)
+        least = [(samples.log - samples.stamp)[segment == k].min() for k in range(len(jumps) + 1)]
+        others = np.median([usual[other] for other in raw if other not in agreed] or [usual[role]])
         base = int(np.argmin(np.abs(np.array(least, float) - others)))
-        one.stamp = clocks.without(one.stamp, jumps, base)
+        samples.stamp = clocks.without(samples.stamp, jumps, base)
         for step in jumps:
             at, size = (step.log - start) * 1e-9, step.size * 1e-9
-            one.notes.append(f"clock step of {size:+.4f} s at {at:.2f} s taken out")
-        one.late -= sum(step.size < 0 for step in jumps)
+            samples.notes.append(f"clock step of {size:+.4f} s at {at:.2f} s taken out")
+        samples.late -= sum(step.size < 0 for step in jumps)
 
 
 def _agreed(
     raw: dict[str, Raw], find: Callable[[np.ndarray, np.ndarray], list[clocks.Jump]]
 ) -> dict[str, list[clocks.Jump]]:
     """Steps of each role; those at one time have the size that the fastest topic tells."""
-    found = {role: find(one.stamp, one.log) for role, one in raw.items()}
-    found = {role: steps for role, steps in found.items() if steps}
-    for role, steps in found.items():
+    jumps = {role: find(series.stamp, series.log) for role, series in raw.items()}
+    jumps = {role: steps for role, steps in jumps.items() if steps}
+    for role, steps in jumps.items():
         for k, step in enumerate(steps):
             twins = [
                 other
-                for others in found.values()
+                for others in jumps.values()
                 for other in others
                 if abs(other.size - step.size) < max(other.period, step.period, 5_000_000)
                 and abs(other.log - step.log) < 0.5e9
             ]
-            best = min(twins, key=lambda one: (not one.exact, one.period))
+            best = min(twins, key=lambda twin: (not twin.exact, twin.period))
             if not best.exact and role not in CORRECTABLE:
                 raise UserError(
                     f"the clock of {raw[role].topic} steps by {step.size * 1e-9:+.3f} s,"
@@ -226,19 +226,19 @@ def _agreed(
                     " setting clocks"
                 )
             steps[k] = replace(step, size=best.size)
-    return found
+    return jumps
 
 
 def _on_one_clock(raw: dict[str, Raw], late: Mapping[str, float]) -> None:
     wrench = raw["wrench"]
     offsets = {
-        role: clocks.offset(one.stamp, one.log, wrench.stamp, wrench.log)
-        for role, one in raw.items()
+        role: clocks.offset(series.stamp, series.log, wrench.stamp, wrench.log)
+        for role, series in raw.items()
     }
     middle = float(np.median(list(offsets.values())))
     needed = {role: middle - offsets[role] for role in offsets if role not in CORRECTABLE}
     if np.ptp(list(needed.values())) > clocks.TOLERANCE:
-        worst, off = max(needed.items(), key=lambda one: abs(one[1]))
+        worst, off = max(needed.items(), key=lambda pair: abs(pair[1]))
         raise UserError(
             f"the stamps of {raw[worst].topic} are {off:+.3f} s off the other topics'"
             f" clock, record all topics with one clock{_camera_cure(offsets, late)}"
@@ -254,19 +254,19 @@ def _on_one_clock(raw: dict[str, Raw], late: Mapping[str, float]) -> None:
 
 def _at_one_rate(raw: dict[str, Raw]) -> None:
     """The other topics' clocks against the wrench's; colour and depth have one."""
-    found = {role: clocks.drift(one.stamp, one.log) for role, one in raw.items()}
-    found |= dict.fromkeys(CAMERAS, clocks.of_one_clock([found[role] for role in CAMERAS]))
-    reference, span = found.pop("wrench"), float(np.ptp(raw["wrench"].stamp)) * 1e-9
-    for role, growth in found.items():
-        one = raw[role]
-        one.drift = clocks.ClockRate.of(growth, reference, span)
-        if one.drift.taken_out:
-            one.stamp = one.drift.without(one.stamp)
+    drifts = {role: clocks.drift(series.stamp, series.log) for role, series in raw.items()}
+    drifts |= dict.fromkeys(CAMERAS, clocks.of_one_clock([drifts[role] for role in CAMERAS]))
+    reference, span = drifts.pop("wrench"), float(np.ptp(raw["wrench"].stamp)) * 1e-9
+    for role, growth in drifts.items():
+        samples = raw[role]
+        samples.drift = clocks.ClockRate.of(growth, reference, span)
+        if samples.drift.taken_out:
+            samples.stamp = samples.drift.without(samples.stamp)
 
 
 def _camera_cure(offsets: dict[str, float], late: Mapping[str, float]) -> str:
     """The delay that puts pictures on the force's clock; "" where the cameras' clocks differ."""
-    pictures = [late.get(one, 0.0) - offsets[one] for one in offsets if one in CAMERAS]
+    pictures = [late.get(offset, 0.0) - offsets[offset] for offset in offsets if offset in CAMERAS]
     if not pictures or np.ptp(pictures) > clocks.TOLERANCE:
         return ""
     return (
@@ -299,8 +299,8 @@ def _sorted(raw: Raw) -> Stream[Any]:
     if raw.lost:
         raw.notes.append(f"lost {_words(raw)}")
     delay = np.median(raw.log - raw.stamp) * 1e-9
-    about = sum(raw.lost.values()), raw.notes, raw.bursts, (hold or 0.0) * 1e-9, raw.drift
-    return Stream(raw.topic, raw.frame, raw.stamp, values, float(delay), *about)
+    extras = sum(raw.lost.values()), raw.notes, raw.bursts, (hold or 0.0) * 1e-9, raw.drift
+    return Stream(raw.topic, raw.frame, raw.stamp, values, float(delay), *extras)
 
 
 def _without_lone(raw: Raw, values: np.ndarray) -> np.ndarray:

@@ -82,27 +82,31 @@ class _Chooser:
         name = getattr(self.setup.topics, role)
         if name is not None:
             return self._named(role, name)
-        found = self._fitting(role)
+        candidates = self._fitting(role)
         if role.endswith("_info"):
-            return self._info(found, role.removesuffix("_info"), chosen)
+            return self._info(candidates, role.removesuffix("_info"), chosen)
         if role == "twist":  # a command is not a measurement
-            found = [one for one in found if not one.doubts]
-        best, doubt = self.company.best(role, found, chosen)
+            candidates = [candidate for candidate in candidates if not candidate.doubts]
+        best, doubt = self.company.best(role, candidates, chosen)
         if best is None:
             self.problems[:0] = [doubt] if doubt else []
             return None
-        return replace(best.choice, why=_why(best, found), doubt=doubt)
+        return replace(best.choice, why=_why(best, candidates), doubt=doubt)
 
     def _fitting(self, role: str) -> list[Candidate]:
         """Those that could play the role by what they are, asked for once."""
         if role not in self.fitting:
             self.problems = []
-            found = [self._candidate(role, channel) for channel in self.container.channels]
-            suiting = [one for one in found if one is not None and self._suits(role, one)]
+            candidates = [self._candidate(role, channel) for channel in self.container.channels]
+            suiting = [
+                candidate
+                for candidate in candidates
+                if candidate is not None and self._suits(role, candidate)
+            ]
             self.fitting[role] = suiting, self.problems
-        found, problems = self.fitting[role]
+        candidates, problems = self.fitting[role]
         self.problems = [*problems]
-        return found
+        return candidates
 
     def lacking(self, role: str) -> UserError:
         what = ROLES[role].what
@@ -133,13 +137,13 @@ class _Chooser:
         if not fitting:
             types = " or ".join(readers)
             raise UserError(f"{where}: {name} is a {_type(channels[0])}, not {types}")
-        found = self._candidate(role, max(fitting, key=lambda c: len(c.payloads)), named=True)
-        if found is None:
+        candidate = self._candidate(role, max(fitting, key=lambda c: len(c.payloads)), named=True)
+        if candidate is None:
             problem = (self.problems or [f"{name} has no messages, or fingers only"])[0]
             raise UserError(f"{where}: {problem}")
-        if role in PICTURES and (problem := undecodable(role, found.choice)):
+        if role in PICTURES and (problem := undecodable(role, candidate.choice)):
             raise UserError(f"{where}: {name}: {problem}")
-        return replace(found.choice, why=f"setup.topics.{role}")
+        return replace(candidate.choice, why=f"setup.topics.{role}")
 
     def _candidate(self, role: str, channel: Channel, named: bool = False) -> Candidate | None:
         """None, with a word in `problems`, for a channel of the right type that is of no use."""
@@ -174,7 +178,7 @@ class _Chooser:
         return problem is None
 
     def _info(
-        self, found: Sequence[Candidate], role: str, chosen: dict[str, Choice]
+        self, candidates: Sequence[Candidate], role: str, chosen: dict[str, Choice]
     ) -> Choice | None:
         """A camera info belongs to the images in whose folder it is, or with their frame and size.
 
@@ -183,26 +187,35 @@ class _Chooser:
         image, color = chosen[role], chosen["color"]
         topic, frame, size = image.channel.topic, image.typical().frame, _size(image)
         ranked = []
-        for one in found:
-            camera = one.typical.value.camera
-            beside, of_color = _beside(one.topic, topic), _beside(one.topic, color.channel.topic)
-            own = beside and (role == "color" or not of_color)
-            known = camera.frame or (color.typical().frame if of_color else "")
+        for candidate in candidates:
+            camera = candidate.typical.value.camera
+            beside, of_color = (
+                _beside(candidate.topic, topic),
+                _beside(candidate.topic, color.channel.topic),
+            )
+            beside_it = beside and (role == "color" or not of_color)
+            info_frame = camera.frame or (color.typical().frame if of_color else "")
             fits = size is None or size == (camera.width, camera.height)
-            if own or (known == frame and (fits or beside)):
+            if beside_it or (info_frame == frame and (fits or beside)):
                 why = f"beside {topic}" if beside else f"of the frame and size of {topic}"
-                merit = (own, known == frame, fits, beside, len(one.choice.channel.payloads))
-                ranked.append((merit, [-ord(c) for c in one.topic], why, one.choice))
+                merit = (
+                    beside_it,
+                    info_frame == frame,
+                    fits,
+                    beside,
+                    len(candidate.choice.channel.payloads),
+                )
+                ranked.append((merit, [-ord(c) for c in candidate.topic], why, candidate.choice))
             else:
                 pixels = f", {size[0]} x {size[1]}" if size else ""
                 self.problems.append(
-                    f"{one.topic} is of frame {known!r}, {camera.width} x {camera.height} pixels,"
-                    f" {topic} of {frame!r}{pixels}: record the camera info of those images, or"
+                    f"{candidate.topic} is of frame {info_frame!r}, {camera.width} x"
+                    f" {camera.height} pixels, {topic} of {frame!r}{pixels}: record the camera info of those images, or"
                     f" name it in setup.topics.{role}_info"
                 )
         if not ranked:
             return None
-        *_, why, choice = max(ranked, key=lambda one: one[:2])
+        *_, why, choice = max(ranked, key=lambda entry: entry[:2])
         return replace(choice, why=why)
 
 
@@ -215,8 +228,8 @@ def _size(image: Choice) -> tuple[int, int] | None:
     sizes, _ = readable(
         lambda payload: images.size_of(image.read(payload).value), image.channel.payloads
     )
-    known = Counter(size for size in sizes if size is not None)
-    return known.most_common(1)[0][0] if known else None
+    counted = Counter(size for size in sizes if size is not None)
+    return counted.most_common(1)[0][0] if counted else None
 
 
 def undecodable(role: str, choice: Choice) -> str | None:
@@ -240,10 +253,10 @@ def _beside(info: str, image: str) -> bool:
     return any(folder) and folder in (parts[:-1], parts[:-2])
 
 
-def _why(best: Candidate, found: list[Candidate]) -> str:
-    if len(found) == 1:
+def _why(best: Candidate, candidates: list[Candidate]) -> str:
+    if len(candidates) == 1:
         return f"the only {best.kind} for {best.role.what.partition(' (')[0]}"
     named = f"named {' '.join(best.hints)}, " if best.hints else ""
-    others = sorted({one.topic for one in found} - {best.topic})[:2]
+    others = sorted({candidate.topic for candidate in candidates} - {best.topic})[:2]
     rest = f"; not {', '.join(others)}" if others else ""
-    return f"of {len(found)} topics: {named}{best.rate:.0f} Hz{rest}"
+    return f"of {len(candidates)} topics: {named}{best.rate:.0f} Hz{rest}"

@@ -35,8 +35,8 @@ def transforms_of(container: Container) -> TransformTree:
             decode = decoder(channel)
         except UserError:
             continue
-        found, _ = readable(message_reader(decode, _edges), channel.payloads, None)
-        for edge, pose in chain.from_iterable(found):
+        messages, _ = readable(message_reader(decode, _edges), channel.payloads, None)
+        for edge, pose in chain.from_iterable(messages):
             if not static and np.abs(poses.setdefault(edge, pose) - pose).max() > STILL:
                 moving.add(edge)
             poses[edge] = pose
@@ -51,17 +51,17 @@ def transforms_of(container: Container) -> TransformTree:
 
 def _edges(message: Message) -> list[tuple[Edge, np.ndarray]]:
     """Parent and child, and pose of the child in the parent: x y z qx qy qz qw."""
-    found = []
-    for one in getattr(message, "transforms", [message]):
-        if hasattr(one, "transform"):
-            edge, pose = (one.header.frame_id, one.child_frame_id), one.transform
+    edges = []
+    for stamped in getattr(message, "transforms", [message]):
+        if hasattr(stamped, "transform"):
+            edge, pose = (stamped.header.frame_id, stamped.child_frame_id), stamped.transform
         else:
-            edge, pose = (one.parent_frame_id, one.child_frame_id), one
+            edge, pose = (stamped.parent_frame_id, stamped.child_frame_id), stamped
         place = pose.translation
         try:
             numbers = np.array([place.x, place.y, place.z, *quaternion_of(pose.rotation)], float)
         except ValueError:  # some publishers leave the quaternion at zero
             continue
         if np.isfinite(numbers).all():
-            found.append((tuple(printable(str(name)) for name in edge), numbers))
-    return found
+            edges.append((tuple(printable(str(name)) for name in edge), numbers))
+    return edges

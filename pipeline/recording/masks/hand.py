@@ -58,9 +58,9 @@ class Shape:
     def holds(self, points: np.ndarray) -> np.ndarray:
         """Which points (S, 3), relative to the tool centre point, lie in the hand: (S,)."""
         inside, cells = _voxels(points)
-        found = np.zeros(len(points), bool)
-        found[inside] = self.taken[tuple(cells[inside].T)]
-        return found
+        within = np.zeros(len(points), bool)
+        within[inside] = self.taken[tuple(cells[inside].T)]
+        return within
 
 
 def _voxels(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

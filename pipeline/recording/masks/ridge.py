@@ -77,16 +77,16 @@ class RidgeMask:
             self.colors = Colors.learn(np.concatenate(band), others)
 
     def mask(self, frame: Frame) -> np.ndarray:
-        found = self._candidates(frame)
-        rows, columns = np.nonzero(found)
+        candidates = self._candidates(frame)
+        rows, columns = np.nonzero(candidates)
         points = frame.points[rows, columns]
         keep = ~self._in_hand(points, frame.time)
         if self.colors is not None:
             keep &= ~self.colors.against(frame.color[rows, columns])
         if self.scene.taut(frame.time):
             keep &= self._off_lines(points, frame.time) < 0
-        found[rows[~keep], columns[~keep]] = False
-        return _large_enough(found, self.focal * self.scene.diameter / frame.depth[found])
+        candidates[rows[~keep], columns[~keep]] = False
+        return _large_enough(candidates, self.focal * self.scene.diameter / frame.depth[candidates])
 
     def _candidates(self, frame: Frame) -> np.ndarray:
         """Thin, new and near pixels, shape (H, W)."""
@@ -127,11 +127,11 @@ class RidgeMask:
 
     def _surely(self, frame: Frame) -> np.ndarray:
         """Colours (S, 3) of the taut band where nothing else is near."""
-        found = self._candidates(frame)
-        points = frame.points[found]
+        candidates = self._candidates(frame)
+        points = frame.points[candidates]
         sure = distance_to_lines(points, self.scene, frame.time) < 1.5 * self.scene.diameter
         sure &= length(points - self.scene.signals.hand(frame.time)) > 2 * HAND
-        return frame.color[found][sure]
+        return frame.color[candidates][sure]
 
     def _shapes(self, time: float) -> list[Shape | None]:
         """Of the hand at that time; more than one while the fingers move."""
@@ -153,13 +153,13 @@ class RidgeMask:
         room = HAND if scene.holds(time) else 0.0
         if None in shapes:  # no such hand was seen
             room = FINGER + scene.signals.opening_at(time) / 2
-        found = (length(away) < room) | _in_palm(away, scene.signals.tool_axis, None in shapes)
+        near = (length(away) < room) | _in_palm(away, scene.signals.tool_axis, None in shapes)
         for shape in shapes:
             if shape is not None:
-                found |= shape.holds(away)
+                near |= shape.holds(away)
         if self._hangs(time) and self.hanging is not None:
-            found |= (length(away) < REACH) & ~self.hanging.holds(self._from_middle(points))
-        return found
+            near |= (length(away) < REACH) & ~self.hanging.holds(self._from_middle(points))
+        return near
 
 
 def _background(depths: np.ndarray) -> tuple[np.ndarray, float]:
@@ -198,14 +198,14 @@ def _in_palm(away: np.ndarray, tool_axis: np.ndarray, fingers: bool) -> np.ndarr
     return (behind > first) & (behind < PALM[1]) & (aside < PALM[2])
 
 
-def _large_enough(found: np.ndarray, diameters: np.ndarray) -> np.ndarray:
+def _large_enough(mask: np.ndarray, diameters: np.ndarray) -> np.ndarray:
     """Without specks: parts smaller than a piece of band as long as it is thick.
 
     Parts count as one across gaps of two pixels, which depth cameras leave at edges.
     """
-    if not found.any():
-        return found
-    joined = cv2.dilate(found.astype(np.uint8), np.ones((3, 3), np.uint8))
+    if not mask.any():
+        return mask
+    joined = cv2.dilate(mask.astype(np.uint8), np.ones((3, 3), np.uint8))
     _, labels = cv2.connectedComponents(joined, connectivity=8)
-    sizes = np.bincount(labels[found], minlength=labels.max() + 1)
-    return found & (sizes >= 2 * np.median(diameters) ** 2)[labels]
+    sizes = np.bincount(labels[mask], minlength=labels.max() + 1)
+    return mask & (sizes >= 2 * np.median(diameters) ** 2)[labels]

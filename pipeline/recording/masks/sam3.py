@@ -76,8 +76,10 @@ class Sam3Mask:
         session.prompt_input_ids[prompt] = tokens.input_ids
         session.prompt_attention_masks[prompt] = tokens.attention_mask
         with torch.inference_mode():
-            found = [_together(out, session) for out in model.propagate_in_video_iterator(session)]
-        return found
+            tracked = [
+                _together(out, session) for out in model.propagate_in_video_iterator(session)
+            ]
+        return tracked
 
 
 def _together(out: Any, session: Any) -> np.ndarray:

@@ -22,7 +22,8 @@ class Multistart:
         """Start a solver in each region, with `population` candidates an iteration each."""
         seeds = np.random.SeedSequence(seed).generate_state(len(regions))
         self._solvers = [
-            Solver(region, population, int(own)) for region, own in zip(regions, seeds, strict=True)
+            Solver(region, population, int(solver_seed))
+            for region, solver_seed in zip(regions, seeds, strict=True)
         ]
         self.owner = np.repeat(np.arange(len(regions)), population)
 

@@ -76,7 +76,7 @@ COLUMNS = {  # of the table
 
 
 @dataclass(frozen=True)
-class Recording:
+class BandRecording:
     """One recording of a band.
 
     Attributes:
@@ -111,26 +111,26 @@ class Recording:
 
 
 @dataclass(frozen=True)
-class Job(Recording):
+class Job(BandRecording):
     """One variant's identification by a recording."""
 
     method: str
 
     @property
-    def recording(self) -> Recording:
-        return Recording(self.group, self.band, self.pull, self.number)
+    def recording(self) -> BandRecording:
+        return BandRecording(self.group, self.band, self.pull, self.number)
 
 
-def recordings(orange: Path | None, pulls=("informative", "paper")) -> list[Recording]:
+def recordings(orange: Path | None, pulls=("informative", "paper")) -> list[BandRecording]:
     found = [
-        Recording(group, band, pull, number)
+        BandRecording(group, band, pull, number)
         for group, most in RECORDINGS.items()
         for number in range(most)
         for pull in pulls
         for band in SETS[group][1]
     ]
     count = len(OF_ORANGE) if orange else 0
-    return [Recording("orange", ORANGE, "paper", number) for number in range(count)] + found
+    return [BandRecording("orange", ORANGE, "paper", number) for number in range(count)] + found
 
 
 def with_change(params: Params, method: str) -> tuple[Params, str]:
@@ -284,7 +284,7 @@ def main() -> int:
     results, every = ResultLines(work / "results.jsonl"), recordings(orange)
     todo = [Job(**asdict(one), method=method) for one in every for method in METHODS]
     limits = arguments.workers, arguments.minutes
-    for _ in runner.each(partial(Recording.episode, work=work, orange=orange), every, *limits):
+    for _ in runner.each(partial(BandRecording.episode, work=work, orange=orange), every, *limits):
         pass
     runner.run(partial(performed, work=work, orange=orange), todo, results, *limits)
     lines = results.among(todo)

@@ -1,4 +1,4 @@
-"""Texts with gaps: `*.md.j2` of Jinja2 beside the code that fills them.
+"""Texts with gaps: `*.j2` of Jinja2 beside the code that fills them.
 
 A template has all words, and says which of them stand when; the code has all numbers.
 """

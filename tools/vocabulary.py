@@ -2,8 +2,8 @@
 
 python tools/vocabulary.py
 
-Names of Python code, and the text of docs, README, comments and docstrings. CONTRIBUTING.md says
-which word stands instead.
+Names of Python code, and the text of docs, README, templates, comments and docstrings.
+CONTRIBUTING.md says which word stands instead.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ PROSE = {
     r"\bturn(s|ed)? them round\b": "reverse",
     r"\btook part in nothing\b": "held-out",
 }
-PYTHON, TEXT = "*.py", ("README.md", "CONTRIBUTING.md", "docs/*.md")
+PYTHON, TEXT = "*.py", ("README.md", "CONTRIBUTING.md", "docs/*.md", "*.j2")
 
 
 def tracked(*patterns: str) -> list[Path]:

@@ -28,7 +28,7 @@ NESTED = (  # folders of folders: what lies in them is a concern by itself, be i
     "pipeline/report/",
     "rig/",
 )
-NATIVE = (".h", ".cpp", ".html", ".css", ".js")
+NATIVE = (".h", ".cpp", ".css", ".js", ".j2")
 
 
 def files_of(module: str, root: Path = ROOT) -> list[Path]:

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder, write_json, write_text
 from pipeline.episode.episode import Episode
-from pipeline.export import ENGINES, card, mjcf, mjcf_card, newton_file, usd, yaml_file
+from pipeline.export import ENGINES, card, mjcf, newton_file, usd, yaml_file
 from pipeline.export.band import CalibratedBand
 from pipeline.export.chain import SpringChain
 from pipeline.export.match import matched, proof_draws
@@ -56,9 +56,7 @@ def to_mjcf(model: CalibratedBand, folder: Path, episode: Episode | None) -> dic
     done = proven(model, MujocoBand(chain, path), proof, episode)
     files = {path.name: "the model", "README.md": "how to use it, and what came out"}
     content = card.content(model, done, "mjcf", files)
-    springs = content["springs_error"]
-    how = mjcf_card.how(path.name, chain.step, content["time_step_error"], springs)
-    write_text(folder / "README.md", card.readme(content, how))
+    write_text(folder / "README.md", card.readme(content, version=mjcf.VERSION))
     return content
 
 

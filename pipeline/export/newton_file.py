@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pipeline.base.files import write_json, write_text
 from pipeline.episode.episode import Episode
-from pipeline.export import card, newton_card
+from pipeline.export import card
 from pipeline.export.band import CalibratedBand
 from pipeline.export.match import matched, proof_draws
 from pipeline.export.newton_replay import NewtonReplay, loader, numbers
@@ -34,6 +34,5 @@ def to_newton(model: CalibratedBand, folder: Path, episode: Episode | None) -> d
     }
     content = card.content(model, done, "newton", files)
     del content["springs_error"]  # the kernel has the law itself
-    how = newton_card.how(path.name, chain.edges, chain.step, content["time_step_error"])
-    write_text(folder / "README.md", card.readme(content, how))
+    write_text(folder / "README.md", card.readme(content))
     return content

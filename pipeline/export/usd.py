@@ -20,10 +20,10 @@ from pipeline.base.files import write_text
 from pipeline.episode.episode import Episode
 from pipeline.export import values as about
 from pipeline.export.band import CalibratedBand
+from pipeline.export.card import readme
 from pipeline.export.chain import SpringChain
 from pipeline.export.match import draws_of
 from pipeline.export.mesh import Tube
-from pipeline.export.usd_card import readme
 from pipeline.report.quantities import rounded
 from pipeline.simulator.model import GRAVITY
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import base64
 import json
 from pathlib import Path
-from string import Template
 
 import numpy as np
 import pandas as pd
 
 from pipeline.base.files import write_text
+from pipeline.base.template import filled
 from pipeline.episode.episode import Episode
 from pipeline.params.lab import SetupParams
 from pipeline.report.card.camera_view import SIMULATED
@@ -42,7 +42,8 @@ def write_page(
     """
     shown = content(episode, simulated, setup) | {"launches": launches}
     data = json.dumps(shown, separators=(",", ":"))
-    section = Template((HERE / "replay.html").read_text("utf-8")).substitute(
+    section = filled(
+        HERE / "replay.html.j2",
         color=SIMULATED,
         data=data.replace("</", "<\\/"),
         script=(HERE / "replay.js").read_text("utf-8"),

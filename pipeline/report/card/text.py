@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
+from pipeline.base.template import filled
 from pipeline.report.card.findings import Findings
 from pipeline.report.card.inputs import CardInputs
 from pipeline.report.card.values import ShownValue
@@ -45,28 +48,6 @@ def _met(found: Findings) -> str:
     )
 
 
-def residuals(inputs: CardInputs, found: Findings) -> str:
-    """How near the simulation comes, in plain words."""
-    peak = inputs.episode.metadata["preprocessing"]["peak_force"]
-    if not inputs.confidence:
-        return "This method does not tell how near it comes; the report has its loss.\n"
-    pictures = inputs.confidence["recordings"][0]["pictures"]
-    seen = " and ".join(f"{1000 * time:.0f} ms" for time in pictures)
-    recoil = (
-        f"- The **recoil** is met within {1000 * found.recoil:.1f} mm. It is seen {seen} after the"
-        " release;\n  later pictures show the slack band, which no launch depends on.\n"
-    )
-    if not pictures:
-        recoil = "- The **recoil** is in no picture that tells.\n"
-    return f"""\
-What is left, as a root mean square; the sensor's bias and what the camera's calibration leaves
-open are taken out:
-
-- The **force** of the pull is met within {found.force:.2f} N of {peak:.1f} N.
-- The **band in the hand** lies within {1000 * found.held:.1f} mm of the camera's points.
-{recoil}"""
-
-
 def card_text(
     inputs: CardInputs,
     found: Findings,
@@ -78,93 +59,28 @@ def card_text(
     animated: bool = True,
 ) -> str:
     """README.md of a card; without the animation where a replay takes its place."""
-    rig = inputs.params.bands[inputs.band].source == "rig"
-    note = "A band of the **virtual rig**: its recording and its landings are virtual.\n\n"
-    animation = (
-        "![The release, recorded and simulated, 50 times slower](animation.webp)\n\n"
-        "*The release, 50 times slower: the simulated band in the camera's pictures (left) and"
-        " its points (right).*\n"
+    aims, launches = inputs.aims, len(inputs.confidence.get("launches", []))
+    draws = aims.target, aims.draw, aims.landing, aims.failure, aims.interval, aims.hold_force
+    tried = sorted(inputs.launched.kind.value_counts().items())
+    return filled(
+        Path(__file__).with_name("card.md.j2"),
+        band=inputs.band,
+        method=inputs.method,
+        title=SAID[verdict],
+        reasons=reasons,
+        rig=inputs.params.bands[inputs.band].source == "rig",
+        animated=animated,
+        glossary=GLOSSARY,
+        shown=shown,
+        draws=zip(*draws, strict=True),
+        finite=np.isfinite,
+        history=inputs.theta.get("history"),
+        found=found,
+        met=inputs.confidence.get("recordings"),
+        peak=inputs.episode.metadata["preprocessing"]["peak_force"],
+        steps=steps,
+        pulls=len(inputs.episodes),
+        files=", ".join(map(as_code, inputs.recordings)),
+        observed=launches_of(launches) if launches else "no launch",
+        tried=", ".join(f"{n} {kind}" for kind, n in tried) or "none",
     )
-    meanings = f"\n[What each of them is]({GLOSSARY}).\n"
-    return f"""\
-# {inputs.band}: {SAID[verdict]}
-
-{_listed(reasons, "-")}
-{note if rig else ""}{animation if animated else ""}
-## Values
-
-{_values(shown)}{meanings if animated else ""}
-![Values with their intervals](values.png)
-
-## Where to draw
-
-{_draws(inputs)}
-![Predicted landings](landings.png)
-
-## How near the simulation comes
-
-{residuals(inputs, found)}
-![The simulated band in the camera's pictures](camera.webp)
-
-![Force, measured and simulated](force.png)
-
-## What would help next
-
-{_listed(steps, "1.")}
-## What it rests on
-
-{_rests(inputs)}"""
-
-
-def _listed(sentences: list[str], bullet: str) -> str:
-    return "".join(f"{bullet} {one}\n" for one in sentences)
-
-
-def _values(shown: list[ShownValue]) -> str:
-    lines = ["| | value | 90 % interval | prior |", "| --- | --- | --- | --- |"]
-    for one in (one for one in shown if not one.fixed):
-        interval = "not known" if one.low is None else f"{one.low:g}–{one.high:g}"
-        prior = f"{one.prior[0]:g}–{one.prior[1]:g}" if one.prior else "–"
-        prior += "" if one.identified else " (**not identified**)"
-        value = f"{one.value:g} {one.unit}".strip()
-        lines.append(f"| {one.label} | {value} | {interval} | {prior} |")
-    fixed = ", ".join(f"{one.label} {one.value:g}" for one in shown if one.fixed)
-    notes = f"\nFixed, for no pull shows them: {fixed}.\n" if fixed else ""
-    return "\n".join(lines) + "\n" + notes
-
-
-def _draws(inputs: CardInputs) -> str:
-    lines = [
-        "| target | draw y, z | lands at | 90 % interval | force to hold |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    aims = inputs.aims
-    for row, target in enumerate(aims.target):
-        y, z = aims.draw[row]
-        low, high = aims.interval[row]
-        interval = f"{low:.2f} to {high:.2f} m" if np.isfinite(low + high) else "not known"
-        landing = aims.failure[row] or f"{aims.landing[row]:.3f} m"
-        force = f"{aims.hold_force[row]:.1f} N" if np.isfinite(aims.hold_force[row]) else "–"
-        lines.append(f"| {target:g} m | {y:.4f}, {z:.4f} m | {landing} | {interval} | {force} |")
-    history = inputs.theta.get("history")
-    requested = ""
-    if history:
-        requested = (
-            f"\nDraw and wait as in the recording: about {history['pull_time']:.1f} s for the way,"
-            f" then {history['pause']:.1f} s. The band remembers.\n"
-        )
-    return "\n".join(lines) + "\n" + requested
-
-
-def _rests(inputs: CardInputs) -> str:
-    count, launches = len(inputs.episodes), len(inputs.confidence.get("launches", []))
-    files = ", ".join(map(as_code, inputs.recordings))
-    pulls = f"{count} pull{'s' * (count != 1)} in {files}"
-    observed = launches_of(launches) if launches else "no launch"
-    launched = inputs.launched.kind.value_counts()
-    tried = ", ".join(f"{n} {kind}" for kind, n in sorted(launched.items())) or "none"
-    return f"""\
-- Evidence: {pulls}; {observed}.
-- Method: `{inputs.method}`; values in `data/theta/{inputs.band}/{inputs.method}.json`.
-- Landings held against predictions: {tried}.
-"""

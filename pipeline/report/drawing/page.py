@@ -10,9 +10,9 @@ import base64
 import re
 from itertools import pairwise
 from pathlib import Path
-from string import Template
 
 from pipeline.base.errors import UserError
+from pipeline.base.template import filled
 
 HERE = Path(__file__).parent
 
@@ -39,7 +39,8 @@ def page(
     """
     body, chapters = _rendered(markdown, folder)
     begin = next((match.start() for match in re.finditer("<h2 ", body)), len(body))
-    return Template((HERE / "page.html").read_text("utf-8")).substitute(
+    return filled(
+        HERE / "page.html.j2",
         title=title,
         style=(HERE / "page.css").read_text("utf-8"),
         navigation="\n".join(f'<a href="#{id_}">{name}</a>' for id_, name in (*links, *chapters)),

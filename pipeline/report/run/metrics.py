@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from pipeline.report.quantities import QUANTITIES
 from pipeline.report.run.results import Result, Results
 from pipeline.report.run.tables.landings import (
     LAUNCHED,
@@ -18,6 +19,7 @@ from pipeline.report.run.tables.landings import (
     prediction_error,
 )
 
+YOUNG = QUANTITIES["youngs_modulus"]
 DIGITS = 3  # another kind of CPU differs beyond them
 
 
@@ -36,7 +38,7 @@ def summary(results: Results, main: str, theirs: str | None) -> dict[str, float]
         error = _error(methods[main])
         if error is None:
             modulus = methods[main].theta["theta"]["youngs_modulus"]
-            found[f"{band}_kPa"] = 1e-3 * modulus
+            found[f"{band}_{YOUNG.unit}"] = YOUNG.factor * modulus
             continue
         found[f"{band}_cm"] = 100 * error
         if band in results.least:

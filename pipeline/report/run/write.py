@@ -26,7 +26,7 @@ def write(params: Params, root: str | Path = ".") -> None:
     theirs = METHOD if METHOD in report.references[1:] else None
     write_json(report.folder / "summary.json", summary(report.results, report.main, theirs))
     for name, chapters in PAGES.items():
-        markdown = "\n".join(chapter(report) for chapter in chapters)
+        markdown = "\n\n".join(chapter(report).rstrip() for chapter in chapters) + "\n"
         write_text(report.folder / f"{name}.md", markdown)
         write_page(report.folder, name, markdown)
     write_run(report.folder)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 
+from pipeline.base.template import filled
+from pipeline.report.drawing.styles import Styles
 from pipeline.report.run import paper
 from pipeline.report.run.figures.flights import flights
 from pipeline.report.run.figures.hanging import hanging
@@ -16,98 +20,57 @@ from pipeline.report.run.tables.cells import markdown
 from pipeline.report.run.tables.landings import LAUNCHED, of_kind
 
 TARGETS = 101  # between the policies' nearest and farthest, at which a landing's slope is taken
-BULLSEYE = """\
-### Within the bullseye
-
-How many launches land within 20 cm of their target, the radius that the paper names. Launches that
-failed are among those that missed. The paper counts no hits.
-"""
-SENSITIVITY = """\
-### What 1 cm of draw does
-
-By how much a landing moves if the draw is 1 cm off, in the worst direction, by each calibrated
-simulator, over its policy's draws for all trained targets. The paper: "up to 30 cm".
-"""
-HANGING = """\
-### Bands with 1.5 kg
-
-Length of half a band under the weight, ten seconds after it is loaded; in brackets, how far a
-simulator is off the rig's rubber. The paper's caption ("we clamp each rubber band at half of its
-full length") can be read in two ways; the picture shows the first. *: stretched further than the
-recording did.
-"""
-FLIGHTS = """\
-Flights on the rig, and those that each simulator expects, which have no air. The recording's camera
-sees the band alone, so these are drawn for a camera beside the sling.
-"""
 
 
 def evaluation(report: Report) -> str:
     """The chapter, as far as its parts ran."""
-    text = ["## The paper's evaluation\n", *_overview(report), *_method(report)]
-    return "\n".join([*text, *_hits(report), *_sensitivity(report), *_hanging(report)])
+    params, results, styles = report.params, report.results, report.styles
+    shown = report.shown({report.main, *paper.BENCHMARK})  # as in the paper's figures, ours first
+    path = np.linspace(*params.policy.targets, TARGETS)
+    draws = {(r.band, r.method): report.draws(r, path) for r in results if r.method in shown}
+    hits = tables.bullseye(results, styles)
+    lengths = tables.hanging(params, results, tuple(shown)) if results.floors else None
+    hung = tables.hanging_table(lengths, styles) if lengths else None
+    alt = "bands that hang with a weight"
+    return filled(
+        Path(__file__).with_name("evaluation.md.j2"),
+        overview=_overview(report, draws),
+        search=_search(report),
+        hits=markdown(hits, repeats=False),
+        flights=hits and _flights(report, shown),
+        sensitivity=markdown(tables.sensitivity(results, draws, styles), repeats=False),
+        lengths=markdown(hung, repeats=False),
+        hanging=lengths and report.picture("hanging", alt, hanging, lengths, styles),
+    )
 
 
-def _overview(report: Report) -> list[str]:
+def _overview(report: Report, draws: dict[tuple[str, str], np.ndarray]) -> str | None:
     band, methods = next(iter(report.results.methods.items()))
-    one, style = methods[report.main], report.styles[report.main]
-    trials = of_kind(one.trials, *LAUNCHED)
+    trials = of_kind(methods[report.main].trials, *LAUNCHED)
     trials = trials.loc[trials.target.notna()]
     if trials.empty:
-        return []
-    path = report.draws(one, np.linspace(*report.params.policy.targets, TARGETS))
-    recorded, played = report.results.episodes[band], report.replays[band][report.main]
-    alt = "from a recording to launches"
-    return [report.picture("overview", alt, overview, recorded, played, path, trials, style)]
+        return None
+    drawing = report.results.episodes[band], report.replays[band][report.main]
+    drawing = overview, *drawing, draws[band, report.main], trials, report.styles[report.main]
+    return report.picture("overview", "from a recording to launches", *drawing)
 
 
-def _method(report: Report) -> list[str]:
+def _search(report: Report) -> tuple[str, str] | None:
+    """By which method, and its picture."""
     if report.landscape is None:
-        return []
+        return None
     one, chart = report.landscape
-    name = report.styles[one.method].name
     drawing = method, one, chart, report.params.parameters
-    return [
-        f"The search of {name} on the loss itself, over the plane of E and d through its θ*. Points"
-        " have other values on the other axes, so the loss under them is not their own.\n",
-        report.picture("method", "exploration, regions, CMA-ES", *drawing),
-    ]
+    alt = "exploration, regions, CMA-ES"
+    return report.styles[one.method].name, report.picture("method", alt, *drawing)
 
 
-def _hits(report: Report) -> list[str]:
-    results, styles = report.results, report.styles
-    table = tables.bullseye(results, styles)
-    if table is None:
-        return []
-    text, shown = [BULLSEYE, markdown(table, repeats=False)], _shown(report)
-    for band, methods in results.methods.items():
+def _flights(report: Report, shown: Styles) -> tuple[str, str] | None:
+    """On the first band whose flights are known, and their picture."""
+    for band, methods in report.results.methods.items():
         trials = pd.concat([one.trials for one in methods.values()], ignore_index=True)
         flew = set(trials.loc[trials.flight_y.notna()].method)
-        flown = {m: style for m, style in shown.items() if m in flew}
-        if flown:
-            alt = f"flights of {band}"
+        if flown := {method: style for method, style in shown.items() if method in flew}:
             drawing = flights, of_kind(trials, "virtual"), report.params.setup, flown
-            return [*text, f"{FLIGHTS}Here on {band}.\n", report.picture("flights", alt, *drawing)]
-    return text
-
-
-def _sensitivity(report: Report) -> list[str]:
-    path = np.linspace(*report.params.policy.targets, TARGETS)
-    shown = _shown(report)
-    draws = {(r.band, r.method): report.draws(r, path) for r in report.results if r.method in shown}
-    table = tables.sensitivity(report.results, draws, report.styles)
-    return [SENSITIVITY, markdown(table, repeats=False)]
-
-
-def _hanging(report: Report) -> list[str]:
-    if not report.results.floors:
-        return []
-    rows = tables.hanging(report.params, report.results, tuple(_shown(report)))
-    alt = "bands that hang with a weight"
-    picture = report.picture("hanging", alt, hanging, rows, report.styles)
-    return [HANGING, markdown(tables.hanging_table(rows, report.styles), repeats=False), picture]
-
-
-def _shown(report: Report) -> dict:
-    """The methods of the paper's figures, and ours first."""
-    return report.shown({report.main, *paper.BENCHMARK})
+            return band, report.picture("flights", f"flights of {band}", *drawing)
+    return None

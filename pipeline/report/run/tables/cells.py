@@ -31,8 +31,10 @@ SYMBOLS = {
 HEAD = "% Needs booktabs and graphicx. Written by the last stage of `dvc repro`.\n"
 
 
-def markdown(table: Table, repeats: bool = True) -> str:
-    """As markdown; without `repeats`, first cells that repeat those above are blank."""
+def markdown(table: Table | None, repeats: bool = True) -> str:
+    """As markdown; without `repeats`, first cells that repeat those above are blank. "" of None."""
+    if table is None:
+        return ""
     heads, rows = table
     rows = rows if repeats else without_repeats(rows)
     rows = [[MINUS.sub("−", cell) for cell in row] for row in rows]

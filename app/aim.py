@@ -102,5 +102,7 @@ def aim(
 
 def why_refused(answer: Answer) -> str | None:
     """Why no robot should carry an answer out: it misses, fails, or the arm may not hold it."""
-    found = {one.about: one.what for one in answer["warnings"]}
-    return next((found[about] for about in ("failure", "miss", "force") if about in found), None)
+    reasons = {warning.about: warning.what for warning in answer["warnings"]}
+    return next(
+        (reasons[topic] for topic in ("failure", "miss", "force") if topic in reasons), None
+    )

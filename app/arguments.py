@@ -32,28 +32,28 @@ def quantity(unit: str, low: float, high: float, units: dict[str, float], usual:
     def read(text: str) -> float:
         value = number(text)
         if not low <= value <= high:
-            found = {name: value * worth for name, worth in units.items()}
-            found = {name: other for name, other in found.items() if low <= other <= high}
+            readings = {name: value * worth for name, worth in units.items()}
+            readings = {name: other for name, other in readings.items() if low <= other <= high}
             raise argparse.ArgumentTypeError(
-                f"must be in {unit}, from {low:g} to {high:g}, got {text}{likely(found, usual)}"
+                f"must be in {unit}, from {low:g} to {high:g}, got {text}{likely(readings, usual)}"
             )
         return value
 
     return read
 
 
-def likely(found: dict[str, float], usual: float) -> str:
+def likely(readings: dict[str, float], usual: float) -> str:
     """A hint at the one of some units in which a number, given in `found`, is most usual."""
-    if not found:
+    if not readings:
         return ""
-    name = min(found, key=lambda name: abs(math.log(found[name] / usual)))
-    return f", which looks like {name} ({found[name]:.4g})"
+    name = min(readings, key=lambda name: abs(math.log(readings[name] / usual)))
+    return f", which looks like {name} ({readings[name]:.4g})"
 
 
 def of_a_band(name: str, unit: str, units: dict[str, float], usual: float) -> Callable:
     """A type: a number of params.yaml's `bands`, within the range that it has there."""
     retained = BandParams.model_fields[name].metadata
-    limits = next(one for one in retained if isinstance(one, Range))
+    limits = next(constraint for constraint in retained if isinstance(constraint, Range))
     return quantity(unit, limits.low, limits.high, units, usual)
 
 

@@ -141,12 +141,12 @@ def check(arguments: argparse.Namespace) -> Done:
 
     if arguments.frames and not arguments.json:
         arguments.refuse("argument --frames: used with --json alone")
-    own = arguments.band or Path("params.yaml").exists()
-    if not own:
+    in_project = arguments.band or Path("params.yaml").exists()
+    if not in_project:
         say("no params.yaml in this folder: the settings that come with the package are taken")
     return check(
         arguments.recording,
-        load() if own else Settings.default(),
+        load() if in_project else Settings.default(),
         band=arguments.band,
         diameter=arguments.diameter,
         rest_length=arguments.rest_length,
@@ -163,8 +163,8 @@ def check(arguments: argparse.Namespace) -> Done:
     "write what you measured of your lab into params.yaml: tips, camera, floor, limits",
     "--left-tip=0.7,0.1375,0.42 --right-tip=0.7,-0.1375,0.42 --floor=-0.1",
     *(
-        flag(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=about)
-        for name, (kind, metavar, about) in kinds.MEASURED.items()
+        flag(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=help_text)
+        for name, (kind, metavar, help_text) in kinds.MEASURED.items()
     ),
     JSON,
 )
@@ -274,7 +274,7 @@ def aim(arguments: argparse.Namespace) -> Done:
     params, band = load(), arguments.band
     answer = aim(params, band, arguments.method, arguments.target)
     if not arguments.force and (why := why_refused(answer)):
-        safety.tell(one for one in answer["warnings"] if one.what != why)
+        safety.tell(warning for warning in answer["warnings"] if warning.what != why)
         refusal = f"no draw for {arguments.target:g} m: {why}; --force answers all the same"
         if not arguments.json:
             raise Refusal(refusal)

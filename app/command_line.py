@@ -75,8 +75,8 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         if "--draw: expected one argument" in message:
             message += ", joined by = because it begins with -: --draw=-0.30,-0.17"
-        elif found := re.search(r"(--\S+): expected one argument$", message):
-            message += f"; one that begins with - is joined by =: {found[1]}=-..."
+        elif option := re.search(r"(--\S+): expected one argument$", message):
+            message += f"; one that begins with - is joined by =: {option[1]}=-..."
         self.exit(2, f"error: {printable(message)} (see `{self.prog} --help`)\n")
 
 
@@ -91,17 +91,17 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"sling2sim2real {__version__}")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
-    for name, one in COMMANDS.items():
+    for name, entry in COMMANDS.items():
         sub = commands.add_parser(
             name,
-            help=one.help,
-            description=f"{one.help[0].upper()}{one.help[1:]}.",
-            epilog=f"example:  sling {name} {one.example}",
+            help=entry.help,
+            description=f"{entry.help[0].upper()}{entry.help[1:]}.",
+            epilog=f"example:  sling {name} {entry.example}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        for names, options in one.flags:
+        for names, options in entry.flags:
             sub.add_argument(*names, **options)
-        sub.set_defaults(command=one.run, refuse=sub.error)
+        sub.set_defaults(command=entry.run, refuse=sub.error)
     return top
 
 

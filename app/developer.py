@@ -61,5 +61,5 @@ def figures(arguments: argparse.Namespace) -> Done:
     from app.flow.graph import outdated
     from validation.figures import as_json, listed, shown
 
-    found = listed(Path.cwd(), outdated)
-    return as_json(found) if arguments.json else shown(found)
+    outdated_figures = listed(Path.cwd(), outdated)
+    return as_json(outdated_figures) if arguments.json else shown(outdated_figures)

@@ -24,10 +24,10 @@ def read(path: Path) -> list[Launch]:
     """Launches of a CSV with the columns of data/evidence. Raises UserError."""
     if not path.is_file():
         raise UserError(f"{path}: no such file")
-    found = read_launches(path, error=None)
-    if not found:
+    launches = read_launches(path, error=None)
+    if not launches:
         raise UserError(f"{path}: holds no launch; columns are {','.join(COLUMNS)}")
-    return [(*one.draw, one.error, one.landing) for one in found]
+    return [(*launch.draw, launch.error, launch.landing) for launch in launches]
 
 
 def add(layout: Layout, band: str, launches: Sequence[Launch], equal: Equal = "refused") -> int:
@@ -75,20 +75,20 @@ def joined(
     path = layout.evidence / f"{band}.csv"
     scores = table.scores(layout, band)
     there = table.rows(path, "evidence") if path.is_file() else []
-    known = [(*row.draw, row.landing) for row in there if row.landing is not None]
+    scored = [(*row.draw, row.landing) for row in there if row.landing is not None]
     rows: list[dict] = [row.cells for row in there]
     before = len(there)
     for y, z, error, landing in launches:
         launch = (y, z, landing)
         if table.among(launch, scores):
             raise UserError(table.told_twice(launch, path, layout.measured / path.name))
-        if equal != "added" and table.among(launch, known):
+        if equal != "added" and table.among(launch, scored):
             if equal == "refused":
                 raise UserError(
                     f"{path}: this launch is there already; if you measured one more that is equal,"
                     " add --again; else `dvc repro` runs what is stale"
                 )
-            known.remove(next(one for one in known if table.among(launch, [one])))
+            scored.remove(next(score for score in scored if table.among(launch, [score])))
             continue
         values = (y, z, "" if error is None else error, landing)
         rows.append(dict(zip(COLUMNS, values, strict=True)))

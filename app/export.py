@@ -22,12 +22,12 @@ def export_of_run(
     """
     expect_known(params, "band", band)
     expect_known(params, "method", method)
-    found, layout = Identification.of_run(band, method), Layout()
+    identification, layout = Identification.of_run(band, method), Layout()
     out = out or layout.data / "exports" / band / to
     expect_writable(out)
     there = layout.episode(band).is_dir()
     episode = Episode.load_all(layout.episodes(band))[0] if there else None
-    done = export(found, to, out, episode=episode)
+    done = export(identification, to, out, episode=episode)
     return done.folder, done.card
 
 

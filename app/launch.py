@@ -81,8 +81,8 @@ def interval_90(
     Args:
         launcher, samples, error: As `landing_intervals` takes them.
     """
-    found = landing_intervals(launcher, np.array(draw), samples, error)[0]
-    return found.tolist() if np.isfinite(found).all() else None
+    interval = landing_intervals(launcher, np.array(draw), samples, error)[0]
+    return interval.tolist() if np.isfinite(interval).all() else None
 
 
 def _samples(theta: Path, content: dict, root: Path) -> Parameters | None:

@@ -51,8 +51,8 @@ def observe(
         root: Of the project.
 
     Returns:
-        `file`, `launches` in it, `measured_m` of this one, what `known` says `before` and `after`,
-        and `warnings`, which are printed on stderr before stages run.
+        `file`, `launches` in it, `measured_m` of this one, what `interval_at` says `before` and
+        `after`, and `warnings`, which are printed on stderr before stages run.
 
     Raises:
         UserError: It can be no launch, or is known already, and nothing is written; or a stage
@@ -64,13 +64,13 @@ def observe(
     number = evidence.add(layout, band, [(*draw, error, landing)], equal)
     answer = {"file": str(layout.evidence / f"{band}.csv"), "launches": number}
     answer["measured_m"] = landing
-    answer["before"] = known(params, band, method, draw, layout.root, error)
+    answer["before"] = interval_at(params, band, method, draw, layout.root, error)
     doubts = list(doubted(answer["before"], landing, answer["file"]))
     earlier = evidence.read(layout.evidence / f"{band}.csv")[:-1]
-    doubts += softened(params, band, method, draw, layout, [one[:2] for one in earlier])
+    doubts += softened(params, band, method, draw, layout, [launch[:2] for launch in earlier])
     safety.tell(doubts)
     ran = _run(stage, layout)
-    answer["after"] = known(params, band, method, draw, layout.root, error) if ran else None
+    answer["after"] = interval_at(params, band, method, draw, layout.root, error) if ran else None
     if failure := (answer["after"] or {}).get("failure"):
         what = f"the launch fails in simulation, so it counts for nothing: {failure}"
         doubts.append(Hazard("failure", what))
@@ -94,9 +94,9 @@ def undo(
     (y, z, error, landing), number = evidence.without_last(layout, band)
     answer = {"file": str(layout.evidence / f"{band}.csv"), "launches": number}
     answer |= {"measured_m": landing, "removed": {"draw": [y, z], "error": error}}
-    answer["before"] = known(params, band, method, (y, z), layout.root, error)
+    answer["before"] = interval_at(params, band, method, (y, z), layout.root, error)
     ran = _run(stage, layout)
-    answer["after"] = known(params, band, method, (y, z), layout.root, error) if ran else None
+    answer["after"] = interval_at(params, band, method, (y, z), layout.root, error) if ran else None
     return answer | {"warnings": []}
 
 
@@ -122,7 +122,7 @@ def _run(stage: str | None, layout: Layout) -> bool:
 
 
 def doubted(before: dict | None, landing: float, file: str) -> Iterator[Hazard]:
-    """A measured landing [m] outside the interval that `known` gave before."""
+    """A measured landing [m] outside the interval that `interval_at` gave before."""
     if before is None or before["interval_90_m"] is None:
         return
     low, high = before["interval_90_m"]
@@ -147,12 +147,12 @@ def softened(
         recorded = deepest_draw(Episode.load_all(layout.episodes(band)))
     except NotMade:
         return
-    before = max([recorded, *(float(np.hypot(*one)) for one in launches)])
+    before = max([recorded, *(float(np.hypot(*earlier_draw)) for earlier_draw in launches)])
     if not further(params.bands[band], params.setup, before, float(np.hypot(*draw))):
         return
-    about = params.methods[method]
+    method_params = params.methods[method]
     note = "the launches after it count as of the softened band"
-    if about.law != RUBBER or about.fixed.get("softening") == 0:
+    if method_params.law != RUBBER or method_params.fixed.get("softening") == 0:
         note = f"{method} leaves that out, a new recording and `sling drift` tell by how much"
     yield Hazard(
         "stretch",
@@ -161,7 +161,7 @@ def softened(
     )
 
 
-def known(
+def interval_at(
     params: Params,
     band: str,
     method: str,

@@ -60,7 +60,7 @@ def remove_band(name: str, agreed: Callable[[list[str]], bool], root: Path | str
 
 def files_of(layout: Layout, band: str) -> list[Path]:
     """Whatever bears the band's name, as far as it is there."""
-    found = {
+    files = {
         *layout.data.glob(f"*/{band}"),
         *layout.data.glob(f"*/{band}.*"),
         *layout.measured.glob(f"{band}.csv"),
@@ -69,7 +69,7 @@ def files_of(layout: Layout, band: str) -> list[Path]:
         *layout.root.glob(f".checkpoints/{band}"),
         *layout.root.glob(f".checkpoints/{band}-*"),
     }
-    return sorted(found)
+    return sorted(files)
 
 
 def ask(lines: list[str]) -> bool:

@@ -52,7 +52,7 @@ def reset(keys: Sequence[str], path: Path | str = "params.yaml") -> list[str]:
             changed[leaf] = value
     if not changed:
         return []
-    back = edited(text, lambda content: [_set(content, *one) for one in changed.items()])
+    back = edited(text, lambda content: [_set(content, *change) for change in changed.items()])
     parse(back, str(path))
     write_text(path, back)
     return [f"{'.'.join(k)} was {_value(now, k)}, is {v} again" for k, v in changed.items()]

@@ -111,8 +111,8 @@ def of_confidence(content: dict, path: Path) -> Iterator[Hazard]:
 
 def of_identification(params: Params, content: dict, path: Path) -> Iterator[Hazard]:
     """A θ file of a run whose settings have changed since; a hand-written one has no run."""
-    known = owner(path)
-    if known and (method := known[2]):
+    owner_of_file = owner(path)
+    if owner_of_file and (method := owner_of_file[2]):
         mended = _mended(stage_of(params, "theta", content["band"], method))
         if "made_with" not in content or method not in params.methods:
             what = f"nothing tells with which params.yaml θ was identified: {mended}"
@@ -133,11 +133,13 @@ def of_policy(
     else:
         if card["made_with"] is None:
             yield Hazard("params", f"nothing tells what the policy was trained with: {mended}")
-    found = {change.key: change for change in changed_since(params, content, method)}
+    by_key = {change.key: change for change in changed_since(params, content, method)}
     if then := card["made_with"]:
         now = policy_settings_of(params, band)
-        found |= {change.key: change for change in changes(then, now)}
-    yield from _of_changes([found[key] for key in sorted(found)], "the policy was trained", mended)
+        by_key |= {change.key: change for change in changes(then, now)}
+    yield from _of_changes(
+        [by_key[key] for key in sorted(by_key)], "the policy was trained", mended
+    )
     if card.get("theta") != content["theta"]:
         what = f"the policy was trained with another θ than there is now: {mended}"
         yield Hazard("params", what)

@@ -124,7 +124,7 @@ def set_up(
             " --right-tip=0.7,-0.14,0.42, or answer at a terminal"
         )
     setup = load(path).setup
-    new, checked = found(measured, setup)
+    new, checked = changes_of(measured, setup)
     old = {key: getattr(setup, key) for key in new}
     changed = {
         key: {"old": _plain(old[key]), "new": _plain(value)}
@@ -143,8 +143,8 @@ def set_up(
 def shown(content: dict) -> str:
     """What changes, and what was checked, in lines."""
     lines = [
-        f"setup.{key}: {_text(one['old'])} -> {_text(one['new'])}"
-        for key, one in content["changed"].items()
+        f"setup.{key}: {_text(change['old'])} -> {_text(change['new'])}"
+        for key, change in content["changed"].items()
     ]
     if lines and not content["written"]:
         lines.append("nothing was written")
@@ -152,7 +152,7 @@ def shown(content: dict) -> str:
     return "\n".join([*lines, *(f"  {line}" for line in content["checked"])])
 
 
-def found(measured: LabMeasures, setup: SetupParams) -> tuple[dict[str, Any], list[str]]:
+def changes_of(measured: LabMeasures, setup: SetupParams) -> tuple[dict[str, Any], list[str]]:
     """New values of `setup`, by key, and what agrees, in words. Raises UserError."""
     new: dict[str, Any] = {}
     checked: list[str] = []
@@ -305,8 +305,8 @@ def _text(value: object) -> str:
 
 
 def _put(section: CommentedMap, changed: dict[str, dict]) -> None:
-    for key, one in changed.items():
-        value = one["new"]
+    for key, change in changed.items():
+        value = change["new"]
         if isinstance(value, list):
             value = CommentedSeq(value)
             value.fa.set_flow_style()

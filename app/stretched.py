@@ -20,5 +20,5 @@ def further(band: BandSizes, setup: SetupParams, before: float, draw: float) -> 
             its recordings, it says itself (`preconditioned`).
     """
     draws = np.array([max(before, first_draw(band)), draw])
-    known, now = 2 * np.hypot(setup.fork_width / 2, draws) / band.rest_length
-    return bool(now > max(known, 1.0) + FURTHER)
+    recorded, now = 2 * np.hypot(setup.fork_width / 2, draws) / band.rest_length
+    return bool(now > max(recorded, 1.0) + FURTHER)

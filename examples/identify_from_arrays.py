@@ -26,16 +26,17 @@ def main() -> None:
         release_time=arrays["release_time"],
         settings=SETTINGS,
     )
-    found = s2s.identify([episode], BAND, settings=SETTINGS, progress=print)
+    identification = s2s.identify([episode], BAND, settings=SETTINGS, progress=print)
 
-    print("settled" if found.settled else "NOT settled")
-    for name, one in found.intervals.items():
+    print("settled" if identification.settled else "NOT settled")
+    for name, interval in identification.intervals.items():
         true = getattr(TRUE, name, None)
         truth = "" if true is None else f", truth {true:.4g}"
-        known = "" if one.identifiable else " (fixed, or not seen)"
-        print(f"{name}: {one.value:.4g} {one.unit} [{one.low:.4g}, {one.high:.4g}]{known}{truth}")
+        remark = "" if interval.identifiable else " (fixed, or not seen)"
+        ends = f"[{interval.low:.4g}, {interval.high:.4g}]"
+        print(f"{name}: {interval.value:.4g} {interval.unit} {ends}{remark}{truth}")
 
-    aimed = s2s.aim(found, target=2.0)
+    aimed = s2s.aim(identification, target=2.0)
     low, high = aimed.interval_90
     y, z = aimed.draw
     print(f"draw to y {y:.3f} m, z {z:.3f} m, with {aimed.launch.hold_force:.1f} N")

@@ -38,10 +38,12 @@ class SimulatedRobot:
 
 def main() -> None:
     robot = SimulatedRobot()
-    episode, found, seen = robot.record(), None, []
+    episode, identification, seen = robot.record(), None, []
     for number in range(1, LAUNCHES + 1):
-        found = s2s.identify([episode], BAND, launches=seen, settings=SETTINGS, start=found)
-        aimed = s2s.aim(found, TARGET)
+        identification = s2s.identify(
+            [episode], BAND, launches=seen, settings=SETTINGS, start=identification
+        )
+        aimed = s2s.aim(identification, TARGET)
         for warning in aimed.warnings:
             print("warning:", warning)
         low, high = aimed.interval_90

@@ -34,13 +34,14 @@ def main() -> None:
     }
     simulations = s2s.simulate_batch(model, planned, list(thetas.values()))
     print(f"{'':26} peak force  held force  recoil")
-    for name, one in zip(thetas, simulations, strict=True):
-        if one.failure:
-            print(f"{name:26} {one.failure}")
+    for name, simulation in zip(thetas, simulations, strict=True):
+        if simulation.failure:
+            print(f"{name:26} {simulation.failure}")
             continue
-        size = np.linalg.norm(one.force, axis=1)  # (T,)
-        held = size[one.time < planned.release_time - 0.1][-1]
-        print(f"{name:26} {size.max():8.2f} N {held:9.2f} N {1e3 * recoil(one, planned):5.0f} ms")
+        size = np.linalg.norm(simulation.force, axis=1)  # (T,)
+        held = size[simulation.time < planned.release_time - 0.1][-1]
+        swung = 1e3 * recoil(simulation, planned)
+        print(f"{name:26} {size.max():8.2f} N {held:9.2f} N {swung:5.0f} ms")
 
 
 def recoil(simulated: s2s.Simulation, planned: s2s.Episode) -> float:

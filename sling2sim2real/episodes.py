@@ -13,7 +13,7 @@ from pipeline.base.errors import UserError
 from pipeline.episode import signal
 from pipeline.episode.episode import Episode
 from pipeline.episode.window import window_of
-from sling2sim2real.model import Band, known
+from sling2sim2real.model import Band, with_band
 from sling2sim2real.settings import Settings
 
 VELOCITY_WINDOW = 0.05  # s of the local cubic fits that are differentiated
@@ -42,7 +42,7 @@ def read_mcap(path: str | Path, band: Band, *, settings: Settings | None = None)
     """
     from pipeline.recording.build import build_episodes  # Open3D takes seconds to import
 
-    settings = known(settings or Settings.default(), band)
+    settings = with_band(settings or Settings.default(), band)
     episodes, refused = build_episodes(Path(path), band.name, settings)
     for reason in refused:
         print(f"warning: left out: {reason}", file=sys.stderr)
@@ -103,7 +103,7 @@ def episode_from_arrays(
             or the arrays end too soon after the release.
     """
     settings = settings or Settings.default()
-    about, path_time = settings.episode, _times("time", time)
+    episode_params, path_time = settings.episode, _times("time", time)
     path = _vectors("position", position, len(path_time))
     force_time = path_time if force_time is None else _times("force_time", force_time)
     force = _vectors("force", force, len(force_time))
@@ -116,12 +116,12 @@ def episode_from_arrays(
         )
 
     first, last = max(path_time[0], force_time[0]), min(path_time[-1], force_time[-1])
-    if last < release_time + about.tail:
+    if last < release_time + episode_params.tail:
         raise UserError(
-            f"time: the arrays end at {last:.2f} s; record until {about.tail:g} s"
+            f"time: the arrays end at {last:.2f} s; record until {episode_params.tail:g} s"
             f" (episode.tail) after the release at {release_time:.2f} s"
         )
-    window = window_of(about, first, grasp_time, release_time)
+    window = window_of(episode_params, first, grasp_time, release_time)
     start, period = window.start, window.period
     count = min(window.samples, int((last - start) / period + 1e-6))
 
@@ -174,12 +174,12 @@ def _vectors(name: str, values: np.ndarray, count: int) -> np.ndarray:
 
 
 def _clouds(clouds: Sequence[np.ndarray]) -> list[np.ndarray]:
-    found = [np.asarray(cloud, np.float32).reshape(-1, 3) for cloud in clouds]
-    if not any(map(len, found)):
+    arrays = [np.asarray(cloud, np.float32).reshape(-1, 3) for cloud in clouds]
+    if not any(map(len, arrays)):
         raise UserError("clouds: no frame has a point")
-    if not all(np.isfinite(one).all() for one in found):
+    if not all(np.isfinite(array).all() for array in arrays):
         raise UserError("clouds: hold NaN or infinity; leave such points out")
-    return found
+    return arrays
 
 
 def _thinned(cloud: np.ndarray, most: int) -> np.ndarray:

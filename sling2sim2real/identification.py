@@ -32,7 +32,7 @@ from pipeline.params.identification import parameter_names
 from pipeline.params.provenance import changed_since
 from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from pipeline.simulator.parameters import Parameters
-from sling2sim2real.model import Band, Model, Theta, known
+from sling2sim2real.model import Band, Model, Theta, with_band
 from sling2sim2real.settings import Settings
 
 METHOD = "least_squares"
@@ -98,7 +98,7 @@ class Identification(Model):
             **self.theta.content(self.band.name, self.history),
             "sizes": vars(self.band),
             "mounting": self.mounting and self.mounting.model_dump(),
-            "intervals": {name: vars(one) for name, one in self.intervals.items()},
+            "intervals": {name: vars(interval) for name, interval in self.intervals.items()},
             "samples": samples,
             "settled": self.settled,
             "stretch": self.stretch,
@@ -121,7 +121,7 @@ class Identification(Model):
                 mounting=file.mounting,
                 history=file.history and LaunchHistory(**file.history.model_dump()),
                 settings=file.settings,
-                intervals={name: Interval(**one) for name, one in file.intervals.items()},
+                intervals={name: Interval(**ends) for name, ends in file.intervals.items()},
                 samples=None if file.samples is None else np.array(file.samples, float),
                 settled=file.settled,
                 stretch=file.stretch,
@@ -144,7 +144,7 @@ class Identification(Model):
         layout, settings = Layout(Path(root)), Settings.load(Path(root, "params.yaml"))
         if band not in settings.bands:
             raise UserError(f"{band}: params.yaml has {', '.join(settings.bands)}")
-        about = settings.bands[band]
+        band_params = settings.bands[band]
         content = load_theta(layout.theta(band, method), band)
         file = ThetaFile.model_validate(content)
         samples = load_samples(layout.confidence(band, method), parameters_of(content))
@@ -153,7 +153,7 @@ class Identification(Model):
         there = layout.episode(band).is_dir()
         episodes = Episode.load_all(layout.episodes(band)) if there else []
         return cls(
-            band=Band(about.mass, about.diameter, about.rest_length, band),
+            band=Band(band_params.mass, band_params.diameter, band_params.rest_length, band),
             theta=Theta.of_file(file),
             mounting=read_json(path, Mounting) if file.mounted and path.exists() else None,
             history=file.history and LaunchHistory(**file.history.model_dump()),
@@ -161,7 +161,7 @@ class Identification(Model):
             intervals=_intervals(content, summary) if summary else {},
             samples=None if samples is None else samples.values,
             settled=bool(summary and summary["settled"]),
-            stretch=_stretch(episodes, settings, about),
+            stretch=_stretch(episodes, settings, band_params),
             changed=tuple(map(str, changed_since(settings, content, method))),
             policy=policy if policy.folder.is_dir() else None,
         )
@@ -205,7 +205,7 @@ def identify(
     Raises:
         UserError: No episode; a recording that no simulation can follow.
     """
-    settings = known(settings or Settings.default(), band)
+    settings = with_band(settings or Settings.default(), band)
     if not episodes:
         raise UserError("identify: give at least one episode")
     for episode in episodes:
@@ -217,9 +217,9 @@ def identify(
     if start is None:
         mounting = None
         if settings.methods[METHOD].mounting:
-            found = _clamps(episodes[0], band, settings)
-            mounting = Mounting.model_validate(vars(found))
-            progress(f"mounting: clamps at {found.clamp_angle_deg:.0f} degrees")
+            clamps = _clamps(episodes[0], band, settings)
+            mounting = Mounting.model_validate(vars(clamps))
+            progress(f"mounting: clamps at {clamps.clamp_angle_deg:.0f} degrees")
         sling = _sling(band, settings, mounting)
         evaluate = _evaluator(episodes[0], sling, settings)
     else:
@@ -274,14 +274,16 @@ def _evaluator(episode: Episode, sling: ClampedBand, settings: Settings) -> Eval
 
 def _intervals(content: dict, summary: dict) -> dict[str, Interval]:
     """Of a θ file's content and its confidence."""
-    found = {}
-    for name, one in summary["parameters"].items():
+    result = {}
+    for name, parameter in summary["parameters"].items():
         value, unit = content["theta"][name], SI_UNITS.get(name, "")
-        found[name] = Interval(value, one["low"], one["high"], one["identifiable"], unit)
-    for name, one in summary["derived"].items():
-        value, low, high = (float(one[key]) for key in ("value", "low", "high"))
-        found[name] = Interval(value, low, high, True, one["unit"])
-    return found
+        result[name] = Interval(
+            value, parameter["low"], parameter["high"], parameter["identifiable"], unit
+        )
+    for name, parameter in summary["derived"].items():
+        value, low, high = (float(parameter[key]) for key in ("value", "low", "high"))
+        result[name] = Interval(value, low, high, True, parameter["unit"])
+    return result
 
 
 def _stretch(episodes: Sequence[Episode], settings: Settings, band) -> float | None:

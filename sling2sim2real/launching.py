@@ -131,25 +131,25 @@ def aim(model: Model, target: float) -> Aim:
         draw = _refined(model, _gentlest(model, target), target)
     else:
         draw = policy.draws(np.array([target]))[0]
-    found = launch(model, tuple(draw))
-    if found.failure:
-        raise UserError(f"target {target:g} m: the draw for it fails: {found.failure}")
+    launched = launch(model, tuple(draw))
+    if launched.failure:
+        raise UserError(f"target {target:g} m: the draw for it fails: {launched.failure}")
     samples = getattr(model, "samples", None)
 
     def launcher(draws: np.ndarray, parameters: Parameters = model.theta.parameters) -> Launches:
         return model.launches(draws, parameters.values)
 
     error = model.settings.trials.actuation_error
-    known = None if samples is None else Parameters(model.theta.law, samples)
-    low, high = landing_intervals(launcher, draw, known, error)[0].tolist()
+    sampled = None if samples is None else Parameters(model.theta.law, samples)
+    low, high = landing_intervals(launcher, draw, sampled, error)[0].tolist()
     interval, history = ((low, high) if low == low else None), model.launch_setup.history
     return Aim(
         target=float(target),
-        draw=found.draw,
-        launch=found,
+        draw=launched.draw,
+        launch=launched,
         interval_90=interval,
         pull_and_pause=history and (history.pull_time, history.pause),
-        warnings=tuple(_warnings(model, found.draw, samples, interval)),
+        warnings=tuple(_warnings(model, launched.draw, samples, interval)),
     )
 
 
@@ -197,11 +197,11 @@ def _warnings(
         yield "no interval: too many launches beside the predicted one fail"
     sizes = model.settings.setup.fork_width, model.band.rest_length
     requested = float(stretch_of(np.array([[0.0, *draw]]), *sizes)[0])
-    known = getattr(model, "stretch", None)
-    if known is not None and requested > known + ROUNDING:
+    stretch = getattr(model, "stretch", None)
+    if stretch is not None and requested > stretch + ROUNDING:
         yield (
             f"the draw stretches the band by {100 * (requested - 1):.1f} %, its recordings by"
-            f" {100 * (known - 1):.1f} % at most: force and landing are extrapolated"
+            f" {100 * (stretch - 1):.1f} % at most: force and landing are extrapolated"
         )
     policy = getattr(model, "policy", None)
     if policy is not None and policy.card()["theta"] != model.theta.content("")["theta"]:

@@ -107,8 +107,8 @@ class Theta:
     returned_share: float = 1.0
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            object.__setattr__(self, one.name, _plain(getattr(self, one.name)))
+        for named in fields(self):
+            object.__setattr__(self, named.name, _plain(getattr(self, named.name)))
         if self.law == RUBBER:  # what is not given of it is none
             for name in ADDED:
                 if getattr(self, name) is None:
@@ -121,7 +121,7 @@ class Theta:
     @property
     def law(self) -> str:
         """Of the material: neo_hookean or rubber."""
-        return RUBBER if any(getattr(self, one) is not None for one in ADDED) else NEO_HOOKEAN
+        return RUBBER if any(getattr(self, name) is not None for name in ADDED) else NEO_HOOKEAN
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -146,12 +146,12 @@ class Theta:
     def content(self, band: str, history: LaunchHistory | None = None) -> dict:
         """What a θ file holds (`sling launch --theta`)."""
         named = {name: getattr(self, name) for name in (*THETA, *ADDED)}
-        known = {}
+        of_law = {}
         if self.law == RUBBER:
-            known = {"law": RUBBER, "history": history and vars(history)}
+            of_law = {"law": RUBBER, "history": history and vars(history)}
         return {
             "band": band,
-            **known,
+            **of_law,
             "theta": {name: value for name, value in named.items() if value is not None},
             "nuisances": {"air_drag": self.air_drag},
             "turn_damping": self.turn_damping,
@@ -196,7 +196,7 @@ class Model:
     settings: Settings = field(default_factory=Settings.default, repr=False)
 
     def __post_init__(self) -> None:
-        known(self.settings, self.band)
+        with_band(self.settings, self.band)
 
     @property
     def parameters(self) -> Parameters:
@@ -244,7 +244,7 @@ class Model:
         return LaunchHistory(**pull_history) if self.theta.law == RUBBER and complete else None
 
 
-def known(settings: Settings, band: Band) -> Settings:
+def with_band(settings: Settings, band: Band) -> Settings:
     """Settings that know the band by its name. Raises UserError where it cannot be."""
     sizes = {name: _plain(getattr(band, name)) for name in ("mass", "diameter", "rest_length")}
     there = settings.bands.get(band.name)

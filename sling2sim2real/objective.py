@@ -95,12 +95,12 @@ class Objective:
         if self._own is None:
             whole = self._box.fill(unit)
             return np.sum([evaluate(whole).total for evaluate in self._evaluators], axis=0)
-        thetas = [self.theta(one) for one in unit]
+        thetas = [self.theta(point) for point in unit]
         model = replace(self._model, theta=thetas[0])
         total = np.zeros(len(unit))
         for episode in self._episodes:
-            for i, one in enumerate(simulate_batch(model, episode, thetas)):
-                total[i] += np.inf if one.failure else self._own(one, episode)
+            for i, simulation in enumerate(simulate_batch(model, episode, thetas)):
+                total[i] += np.inf if simulation.failure else self._own(simulation, episode)
         return total
 
     def theta(self, unit: np.ndarray) -> Theta:

@@ -9,9 +9,9 @@ FILE = Path(__file__).parents[1] / "pipeline" / "__init__.py"
 
 def load() -> None:
     """Import it by its place. Raises ImportError where another one is imported already."""
-    known = sys.modules.get("pipeline")
-    if known is not None:
-        place = getattr(known, "__file__", None) or "a module"
+    loaded = sys.modules.get("pipeline")
+    if loaded is not None:
+        place = getattr(loaded, "__file__", None) or "a module"
         if place != str(FILE) and not (Path(place).exists() and FILE.samefile(place)):
             raise ImportError(
                 f"{place} is called pipeline, as a package of sling2sim2real is: give it another"

@@ -106,7 +106,7 @@ def simulate_batch(model: Model, episode: Episode, thetas: Sequence[Theta]) -> l
 
     with ThreadPoolExecutor(cores()) as pool:
         some = [parameters[i : i + LANES] for i in range(0, len(parameters), LANES)]
-        return [one for each in pool.map(part, some) for one in each]
+        return [simulation for each in pool.map(part, some) for simulation in each]
 
 
 def pull(
@@ -140,5 +140,5 @@ def pull(
     if min(pull_time, pause, frame_rate) <= 0:
         raise UserError("pull: pull_time, pause and frame_rate must be above 0")
     hanging = hanging_guess(model.sling)[model.sling.middle, 2]
-    about = model.settings.episode, model.band.name, hanging, draw
-    return planned_pull(*about, pull_time=pull_time, pause=pause, frame_rate=frame_rate)
+    place = model.settings.episode, model.band.name, hanging, draw
+    return planned_pull(*place, pull_time=pull_time, pause=pause, frame_rate=frame_rate)

@@ -20,11 +20,11 @@ def main() -> None:
     params, band = started("band")
     # with the rod, whatever simulates afterwards: a solid mesh has no rigidity to fit
     sling = ClampedBand.of(params.bands[band], params.setup, params.sling, as_rod=True)
-    found = calibrate_clamps(params, sling, load_episode(band), workers=cores())
-    write_json(Layout().clamps(band), vars(found))
+    clamps = calibrate_clamps(params, sling, load_episode(band), workers=cores())
+    write_json(Layout().clamps(band), vars(clamps))
     print(
-        f"{band}: clamps at {found.clamp_angle_deg:.1f} deg, bending"
-        f" {found.relative_rigidity:.2f} of a solid round band's"
+        f"{band}: clamps at {clamps.clamp_angle_deg:.1f} deg, bending"
+        f" {clamps.relative_rigidity:.2f} of a solid round band's"
     )
 
 

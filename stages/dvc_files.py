@@ -67,7 +67,7 @@ def _cut_back(path: Path) -> None:
     text = path.read_text(encoding="utf-8", errors="replace")
     if _is_valid(text):
         return
-    begins = [one.start() for one in ENTRY.finditer(text)]
+    begins = [match.start() for match in ENTRY.finditer(text)]
     head = text[: begins[-1]] if begins else ""
     if len(begins) < 2:
         path.unlink()
@@ -98,12 +98,12 @@ def _release(path: Path) -> None:
         return
     try:
         held = json.loads(path.read_text(encoding="utf-8"))
-        writers = {one: who for one, who in held.get("write", {}).items() if _lives(who)}
-        readers = {one: [*filter(_lives, who)] for one, who in held.get("read", {}).items()}
+        writers = {locked: who for locked, who in held.get("write", {}).items() if _lives(who)}
+        readers = {locked: [*filter(_lives, who)] for locked, who in held.get("read", {}).items()}
     except (ValueError, AttributeError, TypeError, KeyError):
         path.unlink()
         return
-    readers = {one: who for one, who in readers.items() if who}
+    readers = {locked: who for locked, who in readers.items() if who}
     if (writers, readers) != (held.get("write", {}), held.get("read", {})):
         write_json(path, {"write": writers, "read": readers})
 

@@ -34,7 +34,7 @@ GRACE = 5.0  # s from the interrupt to the end
 def arguments(*names: str) -> list[str]:
     """As many arguments as `names` (band, method); anything else prints the usage and exits 2."""
     given = sys.argv[1:]
-    if len(given) != len(names) or any(one.startswith("-") for one in given):
+    if len(given) != len(names) or any(argument.startswith("-") for argument in given):
         script = f"stages.{Path(sys.argv[0]).stem}"
         print(" ".join(["usage: python -m", script, *map(str.upper, names)]), file=sys.stderr)
         sys.exit(2)
@@ -98,10 +98,10 @@ def _end_with_dvc() -> None:
 
 def remedy(error: NotMade) -> str:
     """In words how a user gets a file, or gets it anew; "" where no stage makes it."""
-    known = owner(error.path)
-    if known is None:
+    owner_of_path = owner(error.path)
+    if owner_of_path is None:
         return ""
-    folder, band, method = known
+    folder, band, method = owner_of_path
     if folder == "raw" and band not in (*load().run.rig, *load().run.dips):
         return f"`sling add-recording --band {band} FILE.mcap` puts a recording there"
     params = load()

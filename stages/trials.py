@@ -25,14 +25,14 @@ from stages.start import run, started
 
 def main() -> None:
     params, band, method = started("band", "method")
-    about, fork_width = params.bands[band], params.setup.fork_width
+    band_params, fork_width = params.bands[band], params.setup.fork_width
     layout = Layout()
     theta = load_theta(layout.theta(band, method), band)
     samples = load_samples(layout.confidence(band, method), parameters_of(theta))
     episodes = Episode.load_all(layout.episodes(band))
 
     batches = trials.scored(load_scores(layout.scores(band)), method)
-    if about.source == "rig":
+    if band_params.source == "rig":
         batches = [trials.Batch.load(layout.launches(band, method)), *batches]
     batches = batches or [trials.aimed(Stored(band, method), list(params.trials.targets))]
 
@@ -45,8 +45,8 @@ def main() -> None:
         batches,
         predicted=launches,
         intervals=intervals,
-        stretch=stretch_of(np.insert(draws, 0, 0, axis=1), fork_width, about.rest_length),
-        recorded=recorded_stretch(episodes, fork_width, about.rest_length),
+        stretch=stretch_of(np.insert(draws, 0, 0, axis=1), fork_width, band_params.rest_length),
+        recorded=recorded_stretch(episodes, fork_width, band_params.rest_length),
     )
     trials.save(table, layout.trials(band, method))
     counts = [f"{batch.kind} {len(batch.draws)}" for batch in batches]

@@ -23,8 +23,15 @@ def table() -> str:
     """All rows as Markdown."""
     rows = [HEADS, ("---",) * len(HEADS)]
     rows += [
-        (f"`{one.name}`", one.compares, one.uncertainty, one.warns, one.refuses, one.remedy)
-        for one in CHECKS
+        (
+            f"`{check.name}`",
+            check.compares,
+            check.uncertainty,
+            check.warns,
+            check.refuses,
+            check.remedy,
+        )
+        for check in CHECKS
     ]
     return "".join(f"| {' | '.join(cell or '–' for cell in row)} |\n" for row in rows)
 

@@ -32,11 +32,11 @@ BY_NAME = "pipeline/identify/optimizers/"
 
 def folders(script: Path, root: Path = ROOT) -> list[str]:
     """The concerns that `script` runs, as dvc.yaml lists them: folders, and the script itself."""
-    found = {script.relative_to(root).as_posix()}
+    paths = {script.relative_to(root).as_posix()}
     for file in closure(script, root):
         if not file.startswith(UNTRACKED) and not file.endswith("/__init__.py"):
-            found.add(concern(file))
-    return sorted(found)
+            paths.add(concern(file))
+    return sorted(paths)
 
 
 def script_of(stage: dict, root: Path = ROOT) -> Path:

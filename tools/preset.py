@@ -38,8 +38,8 @@ def preset(name: str) -> dict:
     """What presets/<name>.yaml holds. Raises UserError."""
     path = PRESETS / f"{name}.yaml"
     if not path.is_file():
-        known = ", ".join(sorted(one.stem for one in PRESETS.glob("*.yaml")))
-        raise UserError(f"{name}: no such preset; there are {known}")
+        presets = ", ".join(sorted(preset_file.stem for preset_file in PRESETS.glob("*.yaml")))
+        raise UserError(f"{name}: no such preset; there are {presets}")
     return YAML(typ="safe").load(path.read_text(encoding="utf-8"))
 
 

@@ -70,8 +70,8 @@ def treloar() -> None:
 def pulls(done: dict) -> None:
     """Force against draw: up along the pull, down in the pause; then over time."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.2))
-    for color, (band, one) in zip(COLORS, done.items(), strict=False):
-        signals = one.signals
+    for color, (band, pull) in zip(COLORS, done.items(), strict=False):
+        signals = pull.signals
         end = signals.release_time - SMOOTHED
         held = (signals.time > signals.grasp_time) & (signals.time < end)
         force = np.linalg.norm(signals.force, axis=1)

@@ -68,30 +68,30 @@ class Server:
 
     def artifact(self, key: str) -> dict | None:
         """The newest of its key."""
-        found = self("artifacts/latest/filter", {"artifacts": {"key": {"any_": [key]}}})
-        return found[0] if found else None
+        artifacts = self("artifacts/latest/filter", {"artifacts": {"key": {"any_": [key]}}})
+        return artifacts[0] if artifacts else None
 
     def run(self) -> dict | None:
         """The newest flow run."""
-        found = self("flow_runs/filter", {"sort": "START_TIME_DESC", "limit": 1})
-        return found[0] if found else None
+        runs = self("flow_runs/filter", {"sort": "START_TIME_DESC", "limit": 1})
+        return runs[0] if runs else None
 
 
 def until(happens, what: str):
     deadline = time.monotonic() + SECONDS
     while time.monotonic() < deadline:
         with contextlib.suppress(OSError):
-            if found := happens():
-                return found
+            if result := happens():
+                return result
         time.sleep(0.3)
     raise UserError(f"in {SECONDS:g} s there was no {what}")
 
 
 @contextlib.contextmanager
 def serving(copy: ProjectCopy) -> Iterator[Server]:
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        port = one.getsockname()[1]
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        port = listener.getsockname()[1]
     command = [*SLING, "ui", "--port", str(port)]
     process = subprocess.Popen(command, cwd=copy.folder, env=copy.environment)
     server = Server(f"http://127.0.0.1:{port}")
@@ -122,8 +122,8 @@ def shoot(copy: ProjectCopy, server: Server, page: Browser, folder: Path) -> Non
     """Take all pictures."""
 
     def artifact(name: str, key: str, *texts: str, height: int | None = None) -> None:
-        one = until(lambda: server.artifact(key), f"artifact {key}")
-        page.open(f"{server.url}/artifacts/artifact/{one['latest_id']}", *texts)
+        artifact_id = until(lambda: server.artifact(key), f"artifact {key}")
+        page.open(f"{server.url}/artifacts/artifact/{artifact_id['latest_id']}", *texts)
         page.shoot(folder / f"{name}.png", height)
 
     def run(name: str, *texts: str) -> None:
@@ -164,7 +164,7 @@ def main() -> None:
         copy.commit()
         with serving(copy) as server:
             shoot(copy, server, page, folder)
-    print(f"wrote {', '.join(sorted(str(one) for one in folder.glob('*.png')))}")
+    print(f"wrote {', '.join(sorted(str(path) for path in folder.glob('*.png')))}")
 
 
 if __name__ == "__main__":

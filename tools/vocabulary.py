@@ -8,6 +8,7 @@ CONTRIBUTING.md says which word stands instead.
 
 from __future__ import annotations
 
+import ast
 import io
 import re
 import subprocess
@@ -25,6 +26,14 @@ NAMES = {  # and what is meant
     "felt": "hand_force, response",
     "heard": "received",
 }
+VAGUE = {  # as variables and parameters, and what stands instead
+    "one": "what it is one of: result, row, launch",
+    "found": "what was found: matches, solution, release",
+    "about": "what it describes: method_params, description",
+    "known": "what is known: prior, finite, defined",
+    "own": "whose or what: seed, band_params",
+}
+SHIPPED = "pipeline", "app", "rig", "sling2sim2real", "stages", "tools", "examples"
 PROSE = {
     r"hangs? on (?!its bands)": "depends on",
     r"\bin floors\b": "/ floor",
@@ -50,6 +59,23 @@ def names(text: str) -> Iterator[tuple[int, str]]:
             yield token.start[0], token.string
 
 
+def variables(text: str) -> Iterator[tuple[int, str]]:
+    """Line and word of each variable or parameter that says nothing of what it holds.
+
+    Fields of classes may: a file or a table of users has them.
+    """
+    tree = ast.parse(text)
+    classes = (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
+    fields = {part.target for node in classes for part in node.body if hasattr(part, "target")}
+    for node in ast.walk(tree):
+        if node in fields:
+            continue
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id in VAGUE:
+            yield node.lineno, node.id
+        elif isinstance(node, ast.arg) and node.arg in VAGUE:
+            yield node.lineno, node.arg
+
+
 def phrases(text: str) -> Iterator[tuple[int, str, str]]:
     """Line, phrase and what to write instead, of prose that is not to be used."""
     for pattern, better in PROSE.items():
@@ -65,6 +91,8 @@ def main() -> int:
         text, place = path.read_text(encoding="utf-8"), path.relative_to(ROOT)
         wrong += [f"{place}:{line}: {word}: {NAMES[word]}" for line, word in names(text)]
         wrong += [f"{place}:{line}: {words}: {better}" for line, words, better in phrases(text)]
+        if place.parts[0] in SHIPPED:
+            wrong += [f"{place}:{line}: {word}: {VAGUE[word]}" for line, word in variables(text)]
     for path in tracked(*TEXT):
         text, place = path.read_text(encoding="utf-8"), path.relative_to(ROOT)
         wrong += [f"{place}:{line}: {words}: {better}" for line, words, better in phrases(text)]

@@ -56,7 +56,7 @@ class Calibrated:
         return launch(self.sling, self.setup, parameters or self.theta, draws, workers=WORKERS)
 
 
-def found(
+def calibrated_by(
     params,
     method: str,
     sling: ClampedBand,

@@ -24,7 +24,7 @@ from pipeline.params.lab import Dip
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.replay import recorded_force
-from validation.density import found
+from validation.density import calibrated_by
 from validation.ranks import part_below
 from validation.synthetic import visible
 
@@ -144,7 +144,7 @@ def ranked(params: Params, method: str, dips: Sequence[Dip], seed: Sequence[int]
     """
     rng = np.random.default_rng(seed)
     own = drawn(params, method, dips, rng)
-    outcome, confidence = found(params, method, own.sling, [own.episode])
+    outcome, confidence = calibrated_by(params, method, own.sling, [own.episode])
     names, samples = own.coordinates.names, outcome.samples
     assert samples is not None and outcome.coordinates is not None
     draw = np.array([rng.uniform(*LAUNCHES[0]), rng.uniform(*LAUNCHES[1])])

@@ -26,8 +26,8 @@ def _digest(path: Path) -> str:
     if path.is_file():
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
-    inside = sorted(one for one in path.rglob("*") if one.is_file() and _counts(one))
-    listing = "".join(f"{one.relative_to(path)} {_digest(one)}\n" for one in inside)
+    inside = sorted(inner for inner in path.rglob("*") if inner.is_file() and _counts(inner))
+    listing = "".join(f"{inner.relative_to(path)} {_digest(inner)}\n" for inner in inside)
     return hashlib.sha256(listing.encode()).hexdigest() if path.is_dir() else ""
 
 
@@ -54,8 +54,8 @@ def entries(root: Path, names: tuple[str, ...]) -> dict[str, dict]:
 
     with locked(root):  # DVC writes it in place
         text = _lock_text(root)
-    known = parse_yaml(text, "dvc.lock").get("stages", {})
-    return {name: known[name] for name in names if name in known}
+    stages = parse_yaml(text, "dvc.lock").get("stages", {})
+    return {name: stages[name] for name in names if name in stages}
 
 
 def merge(root: Path, new: Mapping[str, dict]) -> None:

@@ -50,12 +50,12 @@ def introduce(token: str) -> tuple[bool, dict[str, str]]:
 
 def versions() -> dict[str, str]:
     """Of Python and of every package that is installed, by name in lower case."""
-    found = {
+    installed = {
         distribution.name.lower(): distribution.version
         for distribution in distributions()
         if distribution.name
     }
-    return {"python": platform.python_version(), **found}
+    return {"python": platform.python_version(), **installed}
 
 
 def work(order: Order, topic: str) -> tuple[bool, dict | None]:

@@ -58,20 +58,22 @@ def changes(values: Mapping[str, Sequence[ValueOfRecording]]) -> list[ChangeOfBa
         values: In the order of time, of each quantity as many as there are recordings.
     """
     compared = [
-        (name, pair) for name, own in values.items() for pair in combinations(range(len(own)), 2)
+        (name, pair)
+        for name, series in values.items()
+        for pair in combinations(range(len(series)), 2)
     ]
-    found = []
+    ranked = []
     for name, (earlier, later) in compared:
-        one, other = values[name][earlier], values[name][later]
-        gap = np.log(other.value / one.value)
-        sigmas = abs(gap) / np.hypot(one.deviation, other.deviation)
+        first, other = values[name][earlier], values[name][later]
+        gap = np.log(other.value / first.value)
+        sigmas = abs(gap) / np.hypot(first.deviation, other.deviation)
         chance = 2 * norm.sf(sigmas) * len(compared)
         if chance < FALSE_ALARM:
             change = ChangeOfBand(name, earlier, later, float(np.exp(gap)), float(chance))
-            found.append((-sigmas, change))
-    return [change for _, change in sorted(found, key=lambda one: one[0])]
+            ranked.append((-sigmas, change))
+    return [change for _, change in sorted(ranked, key=lambda pair_change: pair_change[0])]
 
 
-def newest(found: Sequence[ChangeOfBand]) -> int:
+def newest(changed: Sequence[ChangeOfBand]) -> int:
     """From which recording on none differs from another; 0 where none changed at all."""
-    return max((one.earlier + 1 for one in found), default=0)
+    return max((change.earlier + 1 for change in changed), default=0)

@@ -54,46 +54,51 @@ def drift(settings: Settings, band: str, root: Path | str = ".") -> dict:
             f" are needed; `sling add-recording --band {band} FILE.mcap` adds one"
         )
     expect_writable(written, written.with_suffix(".png"))
-    about, sizes = environment("cpu", f"sling drift {band}"), settings.bands[band]
-    own = Band(sizes.mass, sizes.diameter, sizes.rest_length, band, sizes.preconditioned)
-    found = identified(files, own, settings, about["code"], written)
-    dated = in_time(found)
-    found = dated or found
-    settled = [number for number, one in enumerate(found) if one.settled]
-    for one in found:
-        if not one.settled:
-            print(f"warning: left out: the fit of {one.file} had not settled", file=sys.stderr)
+    description, sizes = environment("cpu", f"sling drift {band}"), settings.bands[band]
+    band_sizes = Band(sizes.mass, sizes.diameter, sizes.rest_length, band, sizes.preconditioned)
+    recordings = identified(files, band_sizes, settings, description["code"], written)
+    dated = in_time(recordings)
+    recordings = dated or recordings
+    settled = [number for number, recording in enumerate(recordings) if recording.settled]
+    for of_file in recordings:
+        if not of_file.settled:
+            print(f"warning: left out: the fit of {of_file.file} had not settled", file=sys.stderr)
     if len(settled) < 2:
         raise UserError(f"{band}: fewer than two of the recordings could be fitted")
-    values = {name: [found[i].values[name] for i in settled] for name in COMPARED}
+    values = {name: [recordings[i].values[name] for i in settled] for name in COMPARED}
     changed = [
         replace(change, earlier=settled[change.earlier], later=settled[change.later])
         for change in changes(values)
     ]
-    deeper = _stretched_further(own, settings, found)
+    deeper = _stretched_further(band_sizes, settings, recordings)
     new = max([newest(changed), *deeper])
-    fresh = [layout.raw(band) / one.file for one in found[new:] if one.settled]
-    verdict = [_changed(band, one, found, bool(dated)) for one in _first(changed)]
-    verdict += [_softened(band, found, number, before) for number, before in deeper.items()]
+    fresh = [
+        layout.raw(band) / recording.file for recording in recordings[new:] if recording.settled
+    ]
+    verdict = [_changed(band, change, recordings, bool(dated)) for change in _first(changed)]
+    verdict += [_softened(band, recordings, number, before) for number, before in deeper.items()]
     verdict = verdict or [SAME]
-    content = about | {
+    content = description | {
         "band": band,
         "method": METHOD,
         "order": BY_TIME if dated else BY_NAME,
         "recordings": [
-            one.model_dump() | {"date": one.date if dated else None, "new": bool(new) and i >= new}
-            for i, one in enumerate(found)
+            recording.model_dump()
+            | {"date": recording.date if dated else None, "new": bool(new) and i >= new}
+            for i, recording in enumerate(recordings)
         ],
         "false_alarm": FALSE_ALARM,
-        "changes": [asdict(one) for one in changed],
+        "changes": [asdict(change) for change in changed],
         "stretched_further": [{"later": i, "before_m": before} for i, before in deeper.items()],
         "verdict": verdict,
-        "next": anew(own, fresh) if new and fresh else None,
+        "next": anew(band_sizes, fresh) if new and fresh else None,
     }
-    titles = [f"{QUANTITIES[one.quantity].symbol} {_percent(one)}" for one in _first(changed)]
+    titles = [
+        f"{QUANTITIES[change.quantity].symbol} {_percent(change)}" for change in _first(changed)
+    ]
     titles += ["stretched further"] * bool(deeper)
     title = f"{band}: {', '.join(titles or [SAME])}"
-    over_time(written.with_suffix(".png"), found, bool(dated), changed, new, title)
+    over_time(written.with_suffix(".png"), recordings, bool(dated), changed, new, title)
     write_json(written, content)
     return content
 
@@ -101,42 +106,45 @@ def drift(settings: Settings, band: str, root: Path | str = ".") -> dict:
 def _first(changed: Sequence[ChangeOfBand]) -> list[ChangeOfBand]:
     """The surest of each quantity."""
     return [
-        next(one for one in changed if one.quantity == name)
+        next(change for change in changed if change.quantity == name)
         for name in COMPARED
-        if any(one.quantity == name for one in changed)
+        if any(change.quantity == name for change in changed)
     ]
 
 
 def _changed(
-    band: str, change: ChangeOfBand, found: Sequence[IdentifiedRecording], dated: bool
+    band: str, change: ChangeOfBand, recordings: Sequence[IdentifiedRecording], dated: bool
 ) -> str:
     name, quantity = change.quantity, QUANTITIES[change.quantity]
-    one, other = found[change.earlier], found[change.later]
-    before, after = (f"on {each.date}" if dated else f"in {each.file}" for each in (one, other))
+    earlier, other = recordings[change.earlier], recordings[change.later]
+    before, after = (f"on {each.date}" if dated else f"in {each.file}" for each in (earlier, other))
     return (
-        f"{quantity.symbol} of {band} changed: {_interval(one, name)} {quantity.unit} {before},"
+        f"{quantity.symbol} of {band} changed: {_interval(earlier, name)} {quantity.unit} {before},"
         f" {_interval(other, name)} {after}: {_percent(change)};"
         f" it {BECAME[name][change.ratio > 1]}"
     )
 
 
 def _stretched_further(
-    band: Band, settings: Settings, found: Sequence[IdentifiedRecording]
+    band: Band, settings: Settings, recordings: Sequence[IdentifiedRecording]
 ) -> dict[int, float]:
     """Numbers of recordings that stretch a band further than all before, and those' draw [m]."""
-    result, before = {}, found[0].deepest
-    for number, one in enumerate(found):
-        if number and further(band, settings.setup, before, one.deepest):
+    result, before = {}, recordings[0].deepest
+    for number, recording in enumerate(recordings):
+        if number and further(band, settings.setup, before, recording.deepest):
             result[number] = before
-        before = max(before, one.deepest)
+        before = max(before, recording.deepest)
     return result
 
 
-def _softened(band: str, found: Sequence[IdentifiedRecording], number: int, before: float) -> str:
-    one = found[number]
+def _softened(
+    band: str, recordings: Sequence[IdentifiedRecording], number: int, before: float
+) -> str:
+    recording = recordings[number]
     return (
-        f"{one.file} draws {band} to {one.deepest:.3f} m, recordings before it to {before:.3f} m at"
-        f" most: rubber softens up to its largest stretch, so take {band} as changed"
+        f"{recording.file} draws {band} to {recording.deepest:.3f} m, recordings before it to"
+        f" {before:.3f} m at most: rubber softens up to its largest stretch, so take {band} as"
+        " changed"
     )
 
 
@@ -144,8 +152,8 @@ def _percent(change: ChangeOfBand) -> str:
     return f"{100 * (change.ratio - 1):+.0f} %"
 
 
-def _interval(one: IdentifiedRecording, name: str) -> str:
-    value, factor = one.values[name], QUANTITIES[name].factor
+def _interval(recording: IdentifiedRecording, name: str) -> str:
+    value, factor = recording.values[name], QUANTITIES[name].factor
     middle, low, high = (f"{factor * x:.3g}" for x in (value.value, value.low, value.high))
     return f"{middle} ({low} to {high})"
 
@@ -165,12 +173,12 @@ def shown(content: dict) -> str:
     dated = content["order"] == BY_TIME
     rows = [("recording", *(QUANTITIES[name].heading for name in COMPARED), "")]
     for row in content["recordings"]:
-        one = IdentifiedRecording.model_validate(row)
-        left = "" if one.settled else "not settled, left out"
+        recording = IdentifiedRecording.model_validate(row)
+        left = "" if recording.settled else "not settled, left out"
         rows.append(
             (
-                f"{one.date}  {one.file}" if dated else one.file,
-                *(_interval(one, name) for name in COMPARED),
+                f"{recording.date}  {recording.file}" if dated else recording.file,
+                *(_interval(recording, name) for name in COMPARED),
                 left,
             )
         )

@@ -25,7 +25,7 @@ NEW, LEFT_OUT = KNOWN["least_squares"][1], "0.65"
 
 @picture(dpi=130)
 def over_time(
-    found: Sequence[IdentifiedRecording],
+    recordings: Sequence[IdentifiedRecording],
     dated: bool,
     changed: Sequence[ChangeOfBand],
     new: int,
@@ -39,24 +39,24 @@ def over_time(
         new: From which recording on the band is as it is now; 0: it is as it was.
         title: What came out.
     """
-    places, true_times = _places(found, dated)
+    places, true_times = _places(recordings, dated)
     figure, axes = plt.subplots(len(COMPARED), 1, figsize=(8.4, 5.2), sharex=True)
     for ax, name in zip(axes, COMPARED, strict=True):
         factor = QUANTITIES[name].factor
-        for number, (place, one) in enumerate(zip(places, found, strict=True)):
-            value = one.values[name]
+        for number, (place, recording) in enumerate(zip(places, recordings, strict=True)):
+            value = recording.values[name]
             ends = factor * np.array([[value.value - value.low], [value.high - value.value]])
-            color = LEFT_OUT if not one.settled else NEW if new and number >= new else INK
+            color = LEFT_OUT if not recording.settled else NEW if new and number >= new else INK
             style = {"fmt": "o", "color": color, "ms": 5, "capsize": 4, "lw": 1.6}
             ax.errorbar(place, factor * value.value, ends, **style)
-        if change := next((one for one in changed if one.quantity == name), None):
+        if change := next((candidate for candidate in changed if candidate.quantity == name), None):
             numbers = [change.earlier, change.later]
-            ends = [factor * found[number].values[name].value for number in numbers]
+            ends = [factor * recordings[number].values[name].value for number in numbers]
             ax.plot([places[number] for number in numbers], ends, color=NEW, lw=1, ls=":")
             middle = np.mean([places[number] for number in numbers]), np.mean(ends)
             label = f"{100 * (change.ratio - 1):+.0f} %"
-            about = {"xytext": (6, 6), "textcoords": "offset points", "color": NEW}
-            ax.annotate(label, middle, weight="bold", **about)
+            label_style = {"xytext": (6, 6), "textcoords": "offset points", "color": NEW}
+            ax.annotate(label, middle, weight="bold", **label_style)
         ax.set_ylabel(QUANTITIES[name].heading)
         ax.margins(x=0.08, y=0.15)
     last = axes[-1]
@@ -65,8 +65,10 @@ def over_time(
         last.xaxis.set_major_locator(locator)
         last.xaxis.set_major_formatter(ConciseDateFormatter(locator))
     else:
-        shown = range(0, len(found), -(-len(found) // NAMED))
-        names = [found[i].date.removesuffix(" UTC") if dated else found[i].file for i in shown]
+        shown = range(0, len(recordings), -(-len(recordings) // NAMED))
+        names = [
+            recordings[i].date.removesuffix(" UTC") if dated else recordings[i].file for i in shown
+        ]
         last.set_xticks([places[i] for i in shown], map(as_label, names))
         if sum(map(len, names)) > LINE:
             last.tick_params(axis="x", rotation=30)
@@ -76,15 +78,17 @@ def over_time(
     entries = [("one recording alone, 90 % interval", mark(color=INK, **style))]
     if new:
         entries.append(("as the band is now", mark(color=NEW, **style)))
-    if not all(one.settled for one in found):
+    if not all(of_file.settled for of_file in recordings):
         entries.append(("not settled, left out", mark(color=LEFT_OUT, **style)))
     key(figure, entries)
     return figure
 
 
-def _places(found: Sequence[IdentifiedRecording], dated: bool) -> tuple[list[float], bool]:
+def _places(recordings: Sequence[IdentifiedRecording], dated: bool) -> tuple[list[float], bool]:
     """Along the axis, and whether they are dates: else recordings stand evenly, in order."""
-    times = date2num([datetime.fromtimestamp(one.begin / 1e9, UTC) for one in found])
+    times = date2num(
+        [datetime.fromtimestamp(recording.begin / 1e9, UTC) for recording in recordings]
+    )
     if dated and np.diff(times).min() > CROWDED * np.ptp(times):
         return times.tolist(), True
-    return [float(number) for number in range(len(found))], False
+    return [float(number) for number in range(len(recordings))], False

@@ -73,59 +73,61 @@ def identified(
         UserError: A recording cannot be used.
     """
     try:
-        known = {
+        earlier = {
             recording.key: recording for recording in read_json(retained, KeptRecordings).recordings
         }
     except NotMade:
-        known = {}
-    about = json.dumps([vars(band), settings.model_dump(mode="json", include=set(USED)), code])
-    found = []
+        earlier = {}
+    inputs = json.dumps([vars(band), settings.model_dump(mode="json", include=set(USED)), code])
+    result = []
     for file in files:
-        key = fingerprint(about, sha256(file))
-        if not (one := known.get(key)):
+        key = fingerprint(inputs, sha256(file))
+        if not (of_file := earlier.get(key)):
             say(f"{file}: identifying it alone ...")
-            one = _alone(file, key, band, settings)
-        found.append(one.model_copy(update={"file": file.name}))
-    return found
+            of_file = _alone(file, key, band, settings)
+        result.append(of_file.model_copy(update={"file": file.name}))
+    return result
 
 
 def _alone(file: Path, key: str, band: Band, settings: Settings) -> IdentifiedRecording:
     episodes = read_mcap(file, band, settings=settings)
     begins = [episode.metadata["input"]["start_ns"] for episode in episodes]
-    found = identify(episodes, band, settings=settings)
+    identification = identify(episodes, band, settings=settings)
     return IdentifiedRecording(
         file=file.name,
         key=key,
         begin=begins[0],
         end=begins[-1] + int(1e9 * episodes[-1].sample_period * len(episodes[-1].time)),
         pulls=len(episodes),
-        settled=found.settled,
+        settled=identification.settled,
         deepest=deepest_draw(episodes),
-        values=values_of(found),
+        values=values_of(identification),
     )
 
 
-def values_of(found: Identification) -> dict[str, ValueOfRecording]:
+def values_of(identification: Identification) -> dict[str, ValueOfRecording]:
     """Of COMPARED, by name."""
-    assert found.samples is not None  # a fit draws them
-    columns = dict(zip(found.theta.names, found.samples.T, strict=True))
+    assert identification.samples is not None  # a fit draws them
+    columns = dict(zip(identification.theta.names, identification.samples.T, strict=True))
     columns["damping_product"] = columns["elasticity_damping"] * columns["damping_scale"]
     return {
         name: ValueOfRecording(
-            value=found.intervals[name].value,
-            low=found.intervals[name].low,
-            high=found.intervals[name].high,
+            value=identification.intervals[name].value,
+            low=identification.intervals[name].low,
+            high=identification.intervals[name].high,
             deviation=float(np.log(columns[name]).std()),
         )
         for name in COMPARED
     }
 
 
-def in_time(found: Sequence[IdentifiedRecording]) -> list[IdentifiedRecording] | None:
+def in_time(recordings: Sequence[IdentifiedRecording]) -> list[IdentifiedRecording] | None:
     """By their stamps; None where those are no wall clock's.
 
     A simulation's clock begins at 0, or each time anew: then recordings are of the same time.
     """
-    ordered = sorted(found, key=lambda one: one.begin)
-    apart = all(one.end <= after.begin for one, after in zip(ordered, ordered[1:], strict=False))
+    ordered = sorted(recordings, key=lambda recording: recording.begin)
+    apart = all(
+        recording.end <= after.begin for recording, after in zip(ordered, ordered[1:], strict=False)
+    )
     return ordered if apart and ordered[0].begin > CLOCK_SET else None

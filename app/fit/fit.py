@@ -38,7 +38,7 @@ class NewBand:
     rest_length: float | None = None
 
     @property
-    def known(self) -> dict[str, float]:
+    def given(self) -> dict[str, float]:
         return {name: value for name, value in vars(self).items() if value is not None}
 
 
@@ -125,12 +125,12 @@ def brought_in(
         UserError: Nothing is changed.
     """
     at = layout.root / "params.yaml"
-    known = params.bands.get(name)
-    if known is None:
+    band_params = params.bands.get(name)
+    if band_params is None:
         if band.mass is None:
             raise UserError(f"{name}: is new; weigh the band and give --mass KG, such as 0.0408")
-        return add_band(name, recordings, **band.known, params_path=at, root=layout.root)
-    if known.source != "recording":
+        return add_band(name, recordings, **band.given, params_path=at, root=layout.root)
+    if band_params.source != "recording":
         raise UserError(f"{name}: is a band of the virtual rig; choose another name: --name NAME")
     there = digests(layout.recordings(name))
     given = digests(recordings)
@@ -142,7 +142,7 @@ def brought_in(
     if not new and name in (*params.run.bands, *params.run.own):
         renew_masks(recordings, there)
         return f"{name} is there already, with {len(there)} recordings: goes on"
-    values = {what: getattr(known, what) for what in ("mass", "diameter", "rest_length")}
+    values = {what: getattr(band_params, what) for what in ("mass", "diameter", "rest_length")}
     return add_band(name, recordings, **values, params_path=at, root=layout.root)
 
 
@@ -154,7 +154,9 @@ def corrected(path: Path, name: str, band: NewBand) -> Iterator[Params]:
     """
     params = load(path)
     there = params.bands.get(name)
-    new = {what: one for what, one in band.known.items() if there and one != getattr(there, what)}
+    new = {
+        what: value for what, value in band.given.items() if there and value != getattr(there, what)
+    }
     if not (there and new):
         yield params
         return

@@ -121,10 +121,10 @@ def _errors(trials) -> tuple[list[str], list[list[str]]]:
 
     heads = ["target [m]", "launches", "failed", "mean miss [cm]", "±", "bias [cm]"]
     rows = []
-    for target, one in landing_errors(trials).items():
+    for target, errors in landing_errors(trials).items():
         where = "all" if target == "all" else f"{target:.3f}"
-        counts = str(one.launches), str(one.failed)
-        figures = (centimetres(value) for value in (one.mean, one.std, one.bias))
+        counts = str(errors.launches), str(errors.failed)
+        figures = (centimetres(value) for value in (errors.mean, errors.std, errors.bias))
         rows.append([where, *counts, *figures])
     return heads, rows
 

@@ -232,19 +232,19 @@ def reason(name: str, output: list[str], status: int) -> str:
     """Why a stage failed: its own line of error, else what DVC says, else its last line."""
     if signal := _signal(status):  # whatever the stage said of that; DVC's comes by the guard
         return f"{'its guard' if status < 0 else 'DVC'} was killed by signal {signal}"
-    own = [line for line in output if _is_own(line)]
+    messages = [line for line in output if _is_own(line)]
     for line, following in zip(output, [*output[1:], ""], strict=True):
         why = line.removeprefix(f"ERROR: failed to reproduce '{name}': ")
         if why.startswith("failed to run: "):  # ..., exited with 1
             status = int(why.rpartition(" ")[2])
         elif why != line:  # DVC failed before or after the stage's command
-            own.append(f"{why} {following.strip()}" if why.endswith(":") else why)
-    errors = [line[7:] for line in own if line.lower().startswith("error: ")]
+            messages.append(f"{why} {following.strip()}" if why.endswith(":") else why)
+    errors = [line[7:] for line in messages if line.lower().startswith("error: ")]
     if errors:
         return errors[-1]
     if signal := _signal(status):
         return f"was killed by signal {signal}"
-    return own[-1] if own else f"ended with exit status {status}"
+    return messages[-1] if messages else f"ended with exit status {status}"
 
 
 def _signal(status: int) -> int:

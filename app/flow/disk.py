@@ -53,8 +53,8 @@ def expect_writable(*paths: Path) -> None:
 
 def expect_ready(root: Path) -> None:
     """Have DVC work in a project. Raises UserError where stages could not write what they make."""
-    found = [path for pattern in WRITTEN for path in sorted(root.glob(pattern))]
-    expect_writable(root, root / ".dvc" / "tmp", *found)
+    written = [path for pattern in WRITTEN for path in sorted(root.glob(pattern))]
+    expect_writable(root, root / ".dvc" / "tmp", *written)
     expect_room(root)
     _without_git(root)
 

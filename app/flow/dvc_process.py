@@ -38,8 +38,8 @@ class LockYAML(YAML):
         return data
 
     def dump(self, data, stream=None, **options):
-        known = isinstance(data, dict) and [*data] == ["schema", "stages"] and self.entries
-        if stream is None or not (known and data["stages"]):
+        is_lock = isinstance(data, dict) and [*data] == ["schema", "stages"] and self.entries
+        if stream is None or not (is_lock and data["stages"]):
             return super().dump(data, stream, **options)
         stream.write(LOCK)
         for name, entry in data["stages"].items():
@@ -47,9 +47,9 @@ class LockYAML(YAML):
             if json.dumps(entry) == before:
                 stream.write(text)
             else:
-                own = io.StringIO()
-                super().dump({"stages": {name: entry}}, own)
-                stream.write(own.getvalue().removeprefix("stages:\n"))
+                buffer = io.StringIO()
+                super().dump({"stages": {name: entry}}, buffer)
+                stream.write(buffer.getvalue().removeprefix("stages:\n"))
 
 
 def main() -> int:

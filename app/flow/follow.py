@@ -89,7 +89,7 @@ class Log:
         if self.id is None:
             self.id = UUID(events[0][1]["id"])
             self.read = await _known(self.id)
-            for _, event in (one for one in events if one[0] <= self.read):
+            for _, event in (placed for placed in events if placed[0] <= self.read):
                 self._notes(event)
         last = events[-1][1]
         ended = last["what"] == "ended" and "stage" not in last
@@ -190,7 +190,9 @@ class Log:
             dynamic_key=stage,
             tags=tags(stage),
             task_inputs={
-                "wait_for": [core.TaskRunResult(id=self._task(one)) for one in event["producers"]]
+                "wait_for": [
+                    core.TaskRunResult(id=self._task(producer)) for producer in event["producers"]
+                ]
             },
         )
         await models.task_runs.create_task_run(session, task)
@@ -227,14 +229,14 @@ class Log:
         self, session: Any, title: str, stage: str, kind: str, data: object, words: str
     ) -> None:
         """Make it, or change the one that there is."""
-        one = uuid5(self._task(stage), f"{kind} {title}")
+        artifact_id = uuid5(self._task(stage), f"{kind} {title}")
         payload = {"data": data, "description": words}
         change = actions.ArtifactUpdate.model_validate(payload)
-        if await models.artifacts.update_artifact(session, one, change):
+        if await models.artifacts.update_artifact(session, artifact_id, change):
             return
         of = {"flow_run_id": self._run, "task_run_id": self._task(stage)}
         new = core.Artifact.model_validate(
-            {"id": one, "key": key(title), "type": kind, **payload, **of}
+            {"id": artifact_id, "key": key(title), "type": kind, **payload, **of}
         )
         await models.artifacts.create_artifact(session, new)
 
@@ -242,8 +244,8 @@ class Log:
 async def _known(run: UUID) -> int:
     """Up to where the log of a run is in the database."""
     async with provide_database_interface().session_context() as session:
-        found = await models.flow_runs.read_flow_run(session, run)
-        return found.context["read"] if found else 0
+        flow_run = await models.flow_runs.read_flow_run(session, run)
+        return flow_run.context["read"] if flow_run else 0
 
 
 def _state(kind: states.StateType, name: str, at: float, message: str = "") -> states.State:

@@ -53,11 +53,11 @@ def stages_of(root: Path) -> dict[str, Stage]:
 
 def leading_to(stages: Mapping[str, Stage], name: str) -> list[Stage]:
     """A stage and all that it reads from, in the order of `stages`."""
-    found = {name}
+    names = {name}
     for stage in reversed([*stages.values()]):  # consumers first
-        if stage.name in found:
-            found |= {*stage.producers}
-    return [stage for stage in stages.values() if stage.name in found]
+        if stage.name in names:
+            names |= {*stage.producers}
+    return [stage for stage in stages.values() if stage.name in names]
 
 
 class Graph:
@@ -85,12 +85,12 @@ class Graph:
 
     def stale(self) -> list[str]:
         """Stages that DVC would run as things are, and all their consumers, in order."""
-        found: set[str] = set()
+        names: set[str] = set()
         seen = Seen()
         for name, stage in self.stages.items():
-            if not found.isdisjoint(stage.producers) or not self.is_fresh(name, seen):
-                found.add(name)
-        return [name for name in self.stages if name in found]
+            if not names.isdisjoint(stage.producers) or not self.is_fresh(name, seen):
+                names.add(name)
+        return [name for name in self.stages if name in names]
 
     def is_fresh(self, name: str, seen: Seen | None = None) -> bool:
         """Whether DVC would skip this stage as its files are now. Raises UserError.
@@ -190,13 +190,16 @@ def _stages(index) -> dict[str, Stage]:
     import networkx
 
     graph = index.graph  # from consumers to producers; makes of `dvc add` are nodes too
-    known, height = [stage for stage in index.stages if stage.cmd], {}
+    runnable, height = [stage for stage in index.stages if stage.cmd], {}
     for node in networkx.topological_sort(graph):
         height[node] = 1 + max(
             (height[predecessor] for predecessor in graph.predecessors(node)), default=0
         )
-    known.sort(key=lambda one: -height[one])
-    return {one.name: _stage(one, [to for to in graph.successors(one) if to.cmd]) for one in known}
+    runnable.sort(key=lambda stage: -height[stage])
+    return {
+        stage.name: _stage(stage, [to for to in graph.successors(stage) if to.cmd])
+        for stage in runnable
+    }
 
 
 def _stage(stage, producers: list) -> Stage:

@@ -80,8 +80,8 @@ def end(guard: subprocess.Popen, group: Callable[[], int]) -> None:
 
 def main(command: list[str]) -> int:
     """Run `command`; returns its exit status, as a shell has it."""
-    for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(one, lambda *_: None)  # ours ends by stdin; the command gets the default
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: None)  # ours ends by stdin; the command gets the default
     _control(PR_SET_CHILD_SUBREAPER, 1)
     child = subprocess.Popen(
         command,

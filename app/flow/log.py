@@ -45,8 +45,8 @@ class RunLog:
         self._ran: list[str] = []
         self.message = ""  # how the run ended, in words
         name, tags = names(stages)
-        about = {"id": uuid.uuid4().hex, "command": command, "name": name, "tags": tags}
-        self._begins = {"at": time.time(), "what": "begins", **about}
+        header = {"id": uuid.uuid4().hex, "command": command, "name": name, "tags": tags}
+        self._begins = {"at": time.time(), "what": "begins", **header}
 
     def __enter__(self) -> RunLog:
         return self
@@ -59,7 +59,7 @@ class RunLog:
             state = "failed" if isinstance(error, Exception) else "cancelled"
             why = str(error) if isinstance(error, UserError) else type(error).__name__
             self.message = "; ".join(filter(None, [self.message, why]))
-        made = {one: digest for one in self._ran if (digest := entry(self.root, one))}
+        made = {stage: digest for stage in self._ran if (digest := entry(self.root, stage))}
         self._write(what="ended", state=state, message=self.message, made=made)
         self._file.close()
 
@@ -123,5 +123,5 @@ def entry(root: Path, stage: str) -> str:
         text = (root / "dvc.lock").read_text(encoding="utf-8")
     except OSError:
         return ""
-    found = re.search(rf"^  {re.escape(stage)}:\n(?:    .*\n)+", text, re.MULTILINE)
-    return hashlib.md5(found[0].encode()).hexdigest() if found else ""
+    match = re.search(rf"^  {re.escape(stage)}:\n(?:    .*\n)+", text, re.MULTILINE)
+    return hashlib.md5(match[0].encode()).hexdigest() if match else ""

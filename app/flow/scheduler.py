@@ -32,7 +32,7 @@ class Scheduler:
         self._follow_failures()
         if len(self.running) >= self.workers:
             return None
-        open_ones = {one.name for one in self.waiting} | self.running.keys()
+        open_ones = {waiting_stage.name for waiting_stage in self.waiting} | self.running.keys()
         for stage in self.waiting:
             shares = self.shares if stage.gpu else None
             if open_ones.isdisjoint(stage.producers) and shares != []:
@@ -54,7 +54,7 @@ class Scheduler:
 
     def stop(self) -> None:
         """Nothing more begins."""
-        self.not_run += [one.name for one in self.waiting]
+        self.not_run += [stage.name for stage in self.waiting]
         self.waiting.clear()
 
     def _follow_failures(self) -> None:

@@ -85,8 +85,8 @@ def perform(scheduler: Scheduler, tasks: Tasks) -> None:
 
         try:
             while True:
-                while found := scheduler.next():
-                    threads.submit(run, *found)
+                while ready := scheduler.next():
+                    threads.submit(run, *ready)
                 if not scheduler.running:
                     return
                 scheduler.done(*ended.get())

@@ -110,7 +110,12 @@ def designed_pull(
     """
     methods = params.methods.items()
     method = next(
-        (name for name, one in methods if (one.search, one.law) == (LEAST_SQUARES, RUBBER)), None
+        (
+            name
+            for name, method_params in methods
+            if (method_params.search, method_params.law) == (LEAST_SQUARES, RUBBER)
+        ),
+        None,
     )
     if method is None:
         raise UserError(
@@ -154,9 +159,10 @@ def designed_pull(
     return DesignedPull(
         dips=dips,
         targets=targets,
-        paths={name: _path(design, one) for name, one in pulls.items()},
+        paths={name: _path(design, candidate) for name, candidate in pulls.items()},
         half_widths={
-            name: HALF * np.sqrt(design.variances(one)) * targets for name, one in pulls.items()
+            name: HALF * np.sqrt(design.variances(candidate)) * targets
+            for name, candidate in pulls.items()
         },
         draws=len(design.phi),
         tried=count,

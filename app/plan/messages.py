@@ -118,8 +118,8 @@ def draw_picture(trajectory: Trajectory, path: Path | io.BytesIO) -> None:
         axes[0].legend()
         axes[2].set_xlabel("time [s]")
         for phase, start in zip(trajectory.phases, trajectory.times, strict=False):
-            for one in axes:
-                one.axvline(start, color=INK, linewidth=0.4)
+            for panel in axes:
+                panel.axvline(start, color=INK, linewidth=0.4)
             axes[0].annotate(
                 phase.name,
                 (start, 1.0),

@@ -150,9 +150,9 @@ class Plan:
             )
         force = self.force
         if force.force is None:
-            known = force.source
+            source = force.source
         else:
-            known = f"{force.force:.1f} N of {self.max_force:g} N ({force.source})"
+            source = f"{force.force:.1f} N of {self.max_force:g} N ({force.source})"
         facts = {
             "hand": f"{' '.join(f'{v:+.4f}' for v in self.hand)} (x y z w in {self.frame})",
             "fork": f"in {self.frame} by {self.base_source}" if self.base_source else NO_BASE,
@@ -160,7 +160,7 @@ class Plan:
             "pull": f"{self.pull}, with {self.dips} dip{'s' * (self.dips != 1)}",
             "window": f"grasp to release {self.held_time:.2f} s of {self.most_time:.2f} s",
             "stretch": f"{self.stretch:.2f} of the rest length",
-            "force": known,
+            "force": source,
         }
         lines += ["", *(f"{name:<10}{value}" for name, value in facts.items())]
         if self.design:
@@ -259,25 +259,25 @@ def plan_recording(
         raise UserError(f"--precondition: at most {MOST_PULLS}, got {precondition}")
     if pulls > MOST_PULLS:
         raise UserError(f"--pulls: at most {MOST_PULLS} in one recording, got {pulls}")
-    setup, about = params.setup, params.bands[band]
+    setup, band_params = params.setup, params.bands[band]
     settings = params.plan if draw is None else params.plan.model_copy(update={"draw": draw})
     earlier = recorded(params, band, recording, root)
     base, source, frame = _standing(params, band, earlier, root)
     if source is None and settings.orientation is not None:
         raise UserError(f"plan.orientation is the hand's in the robot's base: {NO_BASE}")
     drawn = np.array([0.0, *settings.draw])
-    held = Held.of(about, setup)
+    held = Held.of(band_params, setup)
     limits.check_draw(setup, held, drawn)
     hand = _orientation(settings.orientation, base, drawn)
     axis = (base.rotation.inv() * hand).apply([0.0, 0.0, 1.0])
-    limits.check_hand(settings, about, axis, drawn)
+    limits.check_hand(settings, band_params, axis, drawn)
     prediction = predict(params, band, drawn, theta, earlier)
 
     def through(dips: tuple[Dip, ...]) -> tuple[Trajectory, tuple[float, float]]:
         """The way with these dips, its time in the window, and what there is for it [s]."""
         plan = settings.model_copy(update={"dips": dips})
         limits.check_dips(plan)
-        way = trajectory_of(plan, setup, params.episode, about, axis, pulls, precondition)
+        way = trajectory_of(plan, setup, params.episode, band_params, axis, pulls, precondition)
         limits.check_motion(way, plan)
         limits.check_floor(way, setup, plan)
         return way, limits.check_window(way, plan, params.episode, precondition)
@@ -293,7 +293,7 @@ def plan_recording(
         )
         dips = design.dips
         trajectory, (held_time, most_time) = through(dips)
-    below = -hanging_middle(settings, setup, about)[2]
+    below = -hanging_middle(settings, setup, band_params)[2]
     by = "as a string's catenary" if settings.hanging is None else "plan.hanging"
     return Plan(
         band=band,

@@ -60,8 +60,8 @@ def add_band(
         "diameter": diameter,
         "rest_length": rest_length,
     }
-    known = name in before.bands
-    if known and before.bands[name].model_dump(include={*band}) != band:
+    there_before = name in before.bands
+    if there_before and before.bands[name].model_dump(include={*band}) != band:
         raise UserError(
             f"{params_path}: bands.{name} is there already with other values: choose another name,"
             f" or correct it (`sling fit --name {name} --mass ...`)"
@@ -76,7 +76,7 @@ def add_band(
             f"{layout.raw(name)} holds other recordings already: choose another name, or"
             f" `sling add-recording --band {name}`"
         )
-    if same and known and name in (*before.run.bands, *before.run.own):
+    if same and there_before and name in (*before.run.bands, *before.run.own):
         files.renew_masks(recordings, there)
         return f"{name} is there already: nothing to do"
 

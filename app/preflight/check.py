@@ -76,7 +76,7 @@ def look_at(
         pull: Which of several; None for the first that can be used, if there is one.
     """
     container = read_container(Path(path))
-    about = band or COMMON
+    band_params = band or COMMON
     report = CheckReport(
         path=str(path),
         sha256=sha256(path),
@@ -85,7 +85,7 @@ def look_at(
         notes=container.notes,
         topics=_topics(container),
         band=BandFacts(
-            float(about.diameter), float(about.rest_length), source if band else ASSUMED
+            float(band_params.diameter), float(band_params.rest_length), source if band else ASSUMED
         ),
     )
     recording = None
@@ -100,8 +100,8 @@ def look_at(
         return Look(report, recording)
     if pull is not None and pull > len(pulls):
         raise UserError(f"--pull {pull}: the last pull in {path} is number {len(pulls)}")
-    processed = [Checked.of(one, about, params) for one in pulls]
-    looks = [_look_at_pull(replace(report), one) for one in processed]
+    processed = [Checked.of(found_pull, band_params, params) for found_pull in pulls]
+    looks = [_look_at_pull(replace(report), pull_checked) for pull_checked in processed]
     usable = [look for look in looks if look.report.usable]
     chosen = looks[pull - 1] if pull else (usable or looks)[0]
     chosen.report.pulls = [look.report.row for look in looks]

@@ -49,8 +49,8 @@ def check(
         expect_writable(rrd, ".rrd")
     if pictures:
         expect_new(pictures)
-    about, source = band_of(params, band, diameter, rest_length)
-    look = look_at(recording, params, about, source, pull)
+    band_params, source = band_of(params, band, diameter, rest_length)
+    look = look_at(recording, params, band_params, source, pull)
     if sheet:
         from app.preflight.sheet import draw_sheet
 

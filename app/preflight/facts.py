@@ -106,8 +106,13 @@ class DelayFacts:
     def of(cls, delays: Delays) -> dict[str, DelayFacts]:
         """By what is late."""
         return {
-            role: cls(None if one.error is None else one.value, one.error, one.source, one.applied)
-            for role, one in (("pose", delays.pose), ("camera", delays.camera))
+            role: cls(
+                None if delay.error is None else delay.value,
+                delay.error,
+                delay.source,
+                delay.applied,
+            )
+            for role, delay in (("pose", delays.pose), ("camera", delays.camera))
         }
 
 

@@ -197,8 +197,8 @@ class CheckReport:
         if len(self.pulls) <= 1:
             return [self.verdict, *cautions]
         heads = "".join(f"{name:>13}" for name in ("grasp [s]", "release [s]", "peak [N]"))
-        about = f"pull {self.pull} of {len(self.pulls)}: {self.verdict}"
-        return [about, *cautions, "", f"{'pull':>6}{heads}", *map(str, self.pulls)]
+        line = f"pull {self.pull} of {len(self.pulls)}: {self.verdict}"
+        return [line, *cautions, "", f"{'pull':>6}{heads}", *map(str, self.pulls)]
 
 
 def _motion(phases: list[MotionPhase]) -> str:

@@ -120,14 +120,14 @@ def _whole(
 
     seen, start = _seen(done, params), facts.window_start_s
     grid = figure.add_gridspec(5, len(seen), height_ratios=[0.88, 0.55, 0.92, 1.0, 0.55])
-    for column, one in enumerate(seen):
+    for column, moment in enumerate(seen):
         axes = figure.add_subplot(grid[0, column])
-        axes.imshow(cv2.cvtColor(_overlaid(one.color, one.mask), cv2.COLOR_BGR2RGB))
-        axes.set_title(f"{one.name}, {start + one.time:.3f} s")
+        axes.imshow(cv2.cvtColor(_overlaid(moment.color, moment.mask), cv2.COLOR_BGR2RGB))
+        axes.set_title(f"{moment.name}, {start + moment.time:.3f} s")
         axes.set_axis_off()
         for row, (a, b) in enumerate(((1, 2), (0, 1)), start=1):
             axes = figure.add_subplot(grid[row, column])
-            _cloud(axes, done, one, a, b, labels=column == 0)
+            _cloud(axes, done, moment, a, b, labels=column == 0)
     force = figure.add_subplot(grid[3, :])
     _force(force, done, facts)
     covered = figure.add_subplot(grid[4, :], sharex=force)
@@ -155,11 +155,11 @@ def _overlaid(color: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return cv2.drawContours(large, outlines, -1, MASK, 1)
 
 
-def _cloud(axes: Axes, done: Processed, one: Moment, a: int, b: int, labels: bool) -> None:
-    scene, hand = done.scene, done.signals.hand(one.time)
-    axes.scatter(one.points[:, a], one.points[:, b], s=1.5, color=COLORS[1], linewidths=0)
+def _cloud(axes: Axes, done: Processed, moment: Moment, a: int, b: int, labels: bool) -> None:
+    scene, hand = done.scene, done.signals.hand(moment.time)
+    axes.scatter(moment.points[:, a], moment.points[:, b], s=1.5, color=COLORS[1], linewidths=0)
     for tip in scene.tips:
-        if scene.taut(one.time):
+        if scene.taut(moment.time):
             axes.plot([tip[a], hand[a]], [tip[b], hand[b]], color=COLORS[0], lw=0.8)
         if b == 2:
             axes.plot([tip[a]] * 2, [scene.floor, tip[b]], color="0.7", lw=2, zorder=0)

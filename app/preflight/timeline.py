@@ -194,8 +194,8 @@ def _clouds(log: _Log, done: Processed, start: float, params: Params) -> None:
 
     depth, color = done.pull.recording.depth_camera, done.pull.recording.color_camera
     size = (depth.height, depth.width)
-    one = depth.frame == color.frame and size == (color.height, color.width)
-    entity = f"fork/{'color' if one else 'depth'}/mask"
+    same_view = depth.frame == color.frame and size == (color.height, color.width)
+    entity = f"fork/{'color' if same_view else 'depth'}/mask"
     log.still(entity, rerun.AnnotationContext([(0, "", (0, 0, 0, 0)), (1, "band", BAND)]))
     whole = np.zeros(size, np.uint8)
     for (frame, mask), points in zip(

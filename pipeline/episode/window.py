@@ -61,7 +61,7 @@ def window_of(
     if start > grasp - margin:
         raise UserError(
             f"from grasp to release it takes {release - grasp:.2f} s, more than episode.longest"
-            f" {episode_params.longest:g} s less episode.tail {episode_params.tail:g} s: pull faster,"
-            " with fewer cycles or a shorter pause, or raise episode.longest in params.yaml"
+            f" {episode_params.longest:g} s less episode.tail {episode_params.tail:g} s: pull"
+            " faster, with fewer cycles or a shorter pause, or raise episode.longest in params.yaml"
         )
     return Window(start, samples * period, samples)

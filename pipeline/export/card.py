@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
+
 from pipeline.base.template import filled
-from pipeline.export import values as about
+from pipeline.export import values as export_values
 from pipeline.export.band import CalibratedBand
 from pipeline.export.chain import MATCHED
 from pipeline.export.match import HOLD, LANDING, DrawCompared
 from pipeline.export.proof import Matched
+from pipeline.export.states import state_changes
 from pipeline.report.quantities import QUANTITIES, rounded
 
 UNITS = {"hold_force": "n", "speed": "m_s", "landing": "m"}  # in names of keys
@@ -27,11 +30,11 @@ def content(model: CalibratedBand, done: Matched, target: str, files: dict[str, 
         "band": model.band.name,
         "target": target,
         "files": files,
-        "frames": about.FRAMES,
-        "sizes": about.sizes(model),
+        "frames": export_values.FRAMES,
+        "sizes": export_values.sizes(model),
         "law": model.parameters.law,
-        "history": about.history(model),
-        "values": about.values(model),
+        "history": export_values.history(model),
+        "values": export_values.values(model),
         "matched": [
             {"name": name, "value": rounded(value, 6), "unit": MATCHED[name]}
             for name, value in chain.matched.items()
@@ -50,14 +53,15 @@ def content(model: CalibratedBand, done: Matched, target: str, files: dict[str, 
             name: value if value is None else rounded(value)
             for name, value in asdict(done.pull).items()
         },
-        "without_slot": about.without_slot(model),
+        "other_states": state_changes(model, np.array([row.draw for row in done.proof])),
+        "without_slot": export_values.without_slot(model),
     }
 
 
-def _row(one: DrawCompared) -> dict:
-    row = {"draw_y_m": rounded(one.draw[0], 6), "draw_z_m": rounded(one.draw[1], 6)}
-    for name, error in one.errors.items():
-        ours, theirs = getattr(one, name)
+def _row(compared: DrawCompared) -> dict:
+    row = {"draw_y_m": rounded(compared.draw[0], 6), "draw_z_m": rounded(compared.draw[1], 6)}
+    for name, error in compared.errors.items():
+        ours, theirs = getattr(compared, name)
         row[f"{name}_{UNITS[name]}"] = rounded(ours, 4)
         row[f"{name}_there_{UNITS[name]}"] = rounded(theirs, 4)
         row[f"{name}_error"] = round(error, 4)

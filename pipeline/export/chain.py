@@ -152,9 +152,9 @@ class SpringChain:
         powers = np.stack([strain, strain**2, strain**3, beyond**2, beyond**3], axis=1)
         pull = self.pull(strain)
         weights = 1 / np.maximum(pull, self.pull(KNEE * knee))[:, None]
-        found = np.linalg.lstsq(weights * powers, weights[:, 0] * pull, rcond=None)[0]
-        error = np.abs(weights[:, 0] * (powers @ found - pull)).max()
-        first, second = found[:3], np.array([0.0, *found[3:]])
+        factors = np.linalg.lstsq(weights * powers, weights[:, 0] * pull, rcond=None)[0]
+        error = np.abs(weights[:, 0] * (powers @ factors - pull)).max()
+        first, second = factors[:3], np.array([0.0, *factors[3:]])
         scale = rest ** np.arange(1, 4)
         return first / scale, second / scale, knee, float(error)
 

@@ -44,8 +44,8 @@ def replaceable(folder: Path) -> bool:
     except (OSError, ValueError):
         return not there
     files = card.get("files") if isinstance(card, dict) and "target" in card else None
-    known = set(files) if isinstance(files, dict) else set()
-    return there <= known | {"card.json", "README.md"} and bool(known)
+    listed = set(files) if isinstance(files, dict) else set()
+    return there <= listed | {"card.json", "README.md"} and bool(listed)
 
 
 def to_mjcf(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:

@@ -112,11 +112,11 @@ def _fitted(start: SpringChain, draws: np.ndarray, ours: Launches) -> SpringChai
 
     most = start.most_damping / start.damping_time
     limits = np.array([[-STRONGER, -SHARE, -np.log(20)], [STRONGER, SHARE, np.log(most)]])
-    found = least_squares(
+    solution = least_squares(
         errors, np.ones(len(MATCHED)), bounds=1 + limits,  # about 1: steps are relative
         diff_step=1e-2, x_scale=[0.1, 0.1, 1.0], xtol=1e-5, ftol=1e-6, max_nfev=TURNS,
     )  # fmt: skip
-    return chain_at(found.x)
+    return chain_at(solution.x)
 
 
 def proof_draws(model: CalibratedBand) -> np.ndarray:
@@ -129,7 +129,7 @@ def proof_draws(model: CalibratedBand) -> np.ndarray:
     far, near = sorted(setup.draw_y)
     low, high = sorted(setup.draw_z)
     across = np.linspace(low, high, FINE)
-    found = []
+    nearest = []
     for target, depth in zip(wanted, DEPTHS, strict=True):
         draws = np.column_stack([np.full(FINE, near + depth * (far - near)), across])
         miss = np.abs(model.launches(draws).landing_y - target)
@@ -137,5 +137,5 @@ def proof_draws(model: CalibratedBand) -> np.ndarray:
             raise UserError(
                 f"{model.band.name}: no draw at y = {draws[0, 0]:g} m lands, to prove the export"
             )
-        found.append(draws[np.nanargmin(miss)])
-    return np.array(found)
+        nearest.append(draws[np.nanargmin(miss)])
+    return np.array(nearest)

@@ -36,7 +36,7 @@ class MujocoBand:
         nodes = range(1, chain.edges)
         self._nodes = np.concatenate([self._dofs(f"node{i}") for i in nodes])
         self._hand, self._ball = self._dofs("hand"), self._dofs("projectile")
-        self._hold, self._pouch = (self.model.equality(one).id for one in ("hold", "pouch"))
+        self._hold, self._pouch = (self.model.equality(name).id for name in ("hold", "pouch"))
         self._start = np.array([self.model.body(f"node{i}").pos for i in nodes])
         self._ball_start = self.model.body("projectile").pos.copy()
 

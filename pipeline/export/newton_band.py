@@ -51,9 +51,9 @@ class Numbers:
 
 
 @wp.func
-def spring(one: wp.vec3, other: wp.vec3, v_one: wp.vec3, v_other: wp.vec3, n: Numbers):
+def spring(node: wp.vec3, other: wp.vec3, v_one: wp.vec3, v_other: wp.vec3, n: Numbers):
     """Pull of a spring on its first end."""
-    along = other - one
+    along = other - node
     length = wp.length(along)
     direction = along / length
     stretch = length / n.rest
@@ -138,20 +138,24 @@ class SpringBands:
     """
 
     def __init__(self, numbers: Path | str | dict, count: int = 1, device: str = "cpu"):
-        known = (
+        numbers_known = (
             numbers if isinstance(numbers, dict) else json.loads(Path(numbers).read_text("utf-8"))
         )
-        self.numbers, self.count, self.step_size = known, count, known["time_step_s"]
+        self.numbers, self.count, self.step_size = (
+            numbers_known,
+            count,
+            numbers_known["time_step_s"],
+        )
         n = self._n = Numbers()
-        n.edges, n.floor = known["edges"], known["floor_m"]
-        n.rest = known["rest_length_m"] / n.edges
-        n.node_mass = known["mass_kg"] / n.edges
-        n.projectile_mass = known["projectile_mass_kg"]
-        n.strength, n.share = known["strength_n"], known["mooney_share"]
-        n.damping = known["damping_time_s"]
-        self.arm_stiffness = known["arm_stiffness_n_per_m"] or STIFF
+        n.edges, n.floor = numbers_known["edges"], numbers_known["floor_m"]
+        n.rest = numbers_known["rest_length_m"] / n.edges
+        n.node_mass = numbers_known["mass_kg"] / n.edges
+        n.projectile_mass = numbers_known["projectile_mass_kg"]
+        n.strength, n.share = numbers_known["strength_n"], numbers_known["mooney_share"]
+        n.damping = numbers_known["damping_time_s"]
+        self.arm_stiffness = numbers_known["arm_stiffness_n_per_m"] or STIFF
         n.hand_mass, n.gravity = HAND_MASS, GRAVITY
-        half = known["half_width_m"]
+        half = numbers_known["half_width_m"]
         self.tips = np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
 
         builder = newton.ModelBuilder(gravity=(0.0, 0.0, -GRAVITY))

@@ -38,8 +38,9 @@ class Matched:
     @property
     def met(self) -> bool:
         return all(
-            abs(one.errors["hold_force"]) <= HOLD and abs(one.errors["landing"]) <= LANDING
-            for one in self.proof
+            abs(draw_compared.errors["hold_force"]) <= HOLD
+            and abs(draw_compared.errors["landing"]) <= LANDING
+            for draw_compared in self.proof
         )
 
 

@@ -53,7 +53,7 @@ def compare_pull(model: CalibratedBand, episode: Episode, replay: ChainReplay) -
     length = np.diff(ours.times[held], prepend=times[0])  # steps are irregular
 
     arc = np.linspace(0, chain.rest_length, chain.edges + 1)
-    lines = np.array([_read(arc, model.sling.arc, one) for one in ours.center_line[0, seen]])
+    lines = np.array([_read(arc, model.sling.arc, line) for line in ours.center_line[0, seen]])
     apart = np.sqrt((np.linalg.norm(theirs.line - lines, axis=2) ** 2).mean(axis=1))
     middle = lines[:, chain.edges // 2, None] - chain.tips
     taut = np.linalg.norm(middle, axis=2).min(axis=1) > chain.rest_length / 2

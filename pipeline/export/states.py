@@ -60,7 +60,7 @@ def state_changes(model: CalibratedBand, draws: np.ndarray) -> list[dict[str, fl
                 landing_change=_largest(other.landing_y / matched.landing_y - 1),
             )
         )
-    return [{name: rounded(value) for name, value in asdict(one).items()} for one in changes]
+    return [{name: rounded(value) for name, value in asdict(change).items()} for change in changes]
 
 
 def _largest(changes: np.ndarray) -> float:

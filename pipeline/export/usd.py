@@ -18,7 +18,7 @@ import numpy as np
 
 from pipeline.base.files import write_text
 from pipeline.episode.episode import Episode
-from pipeline.export import values as about
+from pipeline.export import values as export_values
 from pipeline.export.band import CalibratedBand
 from pipeline.export.card import readme
 from pipeline.export.chain import SpringChain
@@ -48,18 +48,18 @@ def to_usd(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict
         "band": model.band.name,
         "target": "usd",
         "files": {name: "the model", "README.md": "what it is, and what it is not"},
-        "frames": about.FRAMES,
-        "sizes": about.sizes(model),
+        "frames": export_values.FRAMES,
+        "sizes": export_values.sizes(model),
         "law": model.parameters.law,
-        "values": about.values(model),
+        "values": export_values.values(model),
         "replayed": False,
         "matched": [
             {"name": "youngs_modulus", "value": rounded(young, 6), "unit": "Pa"},
             {"name": "elasticity_damping", "value": rounded(damping, 6), "unit": "s"},
         ],
         "factor_on_youngs_modulus": rounded(young / theta["youngs_modulus"], 4),
-        "tension_errors": [rounded(float(one)) for one in left],
-        "stretches": [rounded(float(one), 4) for one in stretch],
+        "tension_errors": [rounded(float(error)) for error in left],
+        "stretches": [rounded(float(value), 4) for value in stretch],
         "time_step_s": 1 / RATE,
         "iterations": ITERATIONS,
         "tetrahedra": len(tube.tetrahedra),

@@ -18,14 +18,14 @@ FRAMES = (
 
 def values(model: CalibratedBand) -> list[dict]:
     """Each parameter with its 90 % interval where one is known: name, value, unit, low, high."""
-    intervals, found = getattr(model, "intervals", {}), []
+    intervals, rows = getattr(model, "intervals", {}), []
     theta = model.parameters.sample()
     for name in QUANTITIES:
-        value, known = theta.get(name), intervals.get(name)
+        value, interval = theta.get(name), intervals.get(name)
         if value is None:
             continue
-        sure = known if known is not None and known.low < known.high else None
-        found.append(
+        sure = interval if interval is not None and interval.low < interval.high else None
+        rows.append(
             {
                 "name": name,
                 "value": rounded(value, 6),
@@ -35,7 +35,7 @@ def values(model: CalibratedBand) -> list[dict]:
                 "identified": bool(sure and sure.identifiable),
             }
         )
-    return found
+    return rows
 
 
 def sizes(model: CalibratedBand) -> dict[str, float | list[float] | None]:
@@ -49,7 +49,9 @@ def sizes(model: CalibratedBand) -> dict[str, float | list[float] | None]:
         "fork_height_m": setup.fork_height,
         "projectile_mass_kg": setup.projectile_mass,
         "arm_stiffness_n_per_m": setup.arm_stiffness,
-        "clamp_direction": [rounded(float(one), 6) for one in model.sling.clamp_direction],
+        "clamp_direction": [
+            rounded(float(component), 6) for component in model.sling.clamp_direction
+        ],
         "flexural_rigidity_n_m2": mounting and rounded(mounting.flexural_rigidity, 6),
     }
 

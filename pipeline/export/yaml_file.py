@@ -10,7 +10,7 @@ from ruamel.yaml import YAML
 
 from pipeline.base.files import write_text
 from pipeline.episode.episode import Episode
-from pipeline.export import values as about
+from pipeline.export import values as export_values
 from pipeline.export.band import CalibratedBand
 from pipeline.export.card import readme
 from pipeline.export.match import draws_of
@@ -22,15 +22,15 @@ STRETCHES = np.arange(1.0, 2.21, 0.1)
 
 def to_yaml(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
     """<band>.yaml, and README.md: how to read it."""
-    name, known = f"{model.band.name}.yaml", content_of(model)
+    name, numbers = f"{model.band.name}.yaml", content_of(model)
     files = {name: "values, curve, launches", "README.md": "how to read it"}
-    content = {"band": model.band.name, "target": "yaml", "files": files, **known}
+    content = {"band": model.band.name, "target": "yaml", "files": files, **numbers}
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
     yaml.sort_base_mapping_type_on_output = False  # pyright: ignore[reportAttributeAccessIssue]
     yaml.width = 100
     stream = io.StringIO()
-    yaml.dump(known, stream)
+    yaml.dump(numbers, stream)
     write_text(folder / name, f"# {READ_ME}\n{stream.getvalue()}")
     write_text(folder / "README.md", readme(content))
     return content
@@ -49,19 +49,19 @@ def content_of(model: CalibratedBand) -> dict:
     strength = theta["youngs_modulus"] * np.pi * model.band.diameter**2 / 4
     done = model.launches(draws)
     return {
-        "frames": about.FRAMES,
-        "sizes": about.sizes(model),
+        "frames": export_values.FRAMES,
+        "sizes": export_values.sizes(model),
         "law": parameters.law,
-        "values": about.values(model),
+        "values": export_values.values(model),
         "relaxation_times_s": TIMES.tolist() if parameters.law == RUBBER else [],
-        "history": about.history(model),
+        "history": export_values.history(model),
         "curve": {
-            "stretch": [rounded(one, 4) for one in STRETCHES.tolist()],
-            "pull_n": [rounded(one, 5) for one in (strength / 3 * uniaxial(STRETCHES, *shape))],
+            "stretch": [rounded(value, 4) for value in STRETCHES.tolist()],
+            "pull_n": [rounded(value, 5) for value in (strength / 3 * uniaxial(STRETCHES, *shape))],
         },
         "launches": [
             {
-                "draw_m": [rounded(one, 6) for one in draw],
+                "draw_m": [rounded(coordinate, 6) for coordinate in draw],
                 "hold_force_n": rounded(float(done.hold_force[i]), 4),
                 "speed_m_s": rounded(float(done.speed[i]), 4),
                 "angle_rad": rounded(float(done.angle[i]), 4),

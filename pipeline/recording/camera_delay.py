@@ -1,9 +1,9 @@
 """The camera's delay against the pose, by where the hand is seen.
 
-A late picture shows the hand where it was. Its points, laid over those of pictures in which the
-hand rests, are off by the velocity times the delay; what they are off by place is a matter of the
-extrinsics and is fitted beside it. No model of the hand is needed, but it must be rigid and turn as
-the pose says.
+Iterative closest points (ICP) over a time offset. A late picture shows the hand where it was. Its
+points, laid over those of pictures in which the hand rests, are off by the velocity times the
+delay; what they are off by place is a matter of the extrinsics and is fitted beside it. No model of
+the hand is needed, but it must be rigid and turn as the pose says.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ auto mass_of = [&](int i, int m) -> real {
 // the wind, quadratic: C rho/2 d |v| v for a length, v the part of the speed across the band at the predicted state, d the
 // diameter that keeps the volume of what is stretched. Over the step the matrix is c (1 - t t'), kept as c and sqrt(c) t.
 #define WIND(k, i) STATE[(9 * N + MEMORIES + (k)) * L + (i)]
-auto feel_wind = [&](bool relax) {
+auto update_air_drag = [&](bool relax) {
   for (int i = member; i < L; i += T) {
     const int first = i ? i - 1 : 0, last = i < L - 1 ? i + 1 : i;
     real way[3], speed[3];

@@ -75,38 +75,43 @@ for (int step = 0; step < steps; ++step) {
   recall(row, relax);
 #endif
   SYNC;
-  feel_wind(relax);
+  update_air_drag(relax);
   SYNC;
 
-  // ---- Newton's method; lanes that have settled stay as they are, so that a lane never depends on its neighbours
+  // ---- Regularised Newton's method with a Hessian that may be frozen: (H + shift I) change = residual
+  //
+  //   fresh    H is of this iterate. Where it is indefinite, or its step goes far, the step is rejected and the
+  //            diagonal is shifted more (Levenberg), else less. Convergence is quadratic: a change c leaves one of some c^2.
+  //   frozen   H is that of the iterate before (the chord method; Kelley, Solving Nonlinear Equations with Newton's Method,
+  //            2003). Convergence is linear: two changes c0, c1 leave c1^2 / (c0 - c1). A step that does not halve the
+  //            last change, or follows one that was cut, is rejected.
+  //
+  // Lanes that have settled stay as they are, so that a lane never depends on its neighbours.
   real settled = outcome != zero ? one : zero, reaction[3] = {zero, zero, zero};
-  real before = zero, sound = zero;  // the step that Newton's made last; whether it was made whole
+  real last_change = zero, full_step = zero;  // of the step before: its size, and whether it was made whole
   shift = zero;
   int iteration = 0;
   while (iteration < max_iterations) {
 #if AGAIN
-    fresh = iteration % 2 == 0 || iteration > 6;  // every other one, and all of a hard step's
+    fresh = iteration % 2 == 0 || iteration > 6;  // a frozen one costs half; a hard step has all fresh
 #endif
     ++iteration;
     solve();
-    real refused, scale, enough;
+    real rejected, scale, small;  // small: a change after which the step has settled
     if (fresh) {
-      // a step that an indefinite Hessian gives, or that goes far, is not made: the Hessian is shifted
       const real far = change < zero + (SC)5 * step_limit ? zero : one;
-      refused = maximum(far, change < zero + (SC)2 * tolerance ? zero : indefinite);
-      // with the exact Hessian, convergence is quadratic
-      enough = shift > zero ? zero + (SC)10 * tolerance : inexact > zero ? zero + tolerance : zero + close;
-      shift = refused > zero ? maximum((SC)4 * shift, zero + (SC)0.25) : (shift < zero + (SC)0.05 ? zero : (SC)0.5 * shift);
+      rejected = maximum(far, change < zero + (SC)2 * tolerance ? zero : indefinite);
+      small = shift > zero ? zero + (SC)10 * tolerance : inexact > zero ? zero + tolerance : zero + close;
+      shift = rejected > zero ? maximum((SC)4 * shift, zero + (SC)0.25) : (shift < zero + (SC)0.05 ? zero : (SC)0.5 * shift);
       scale = minimum(one, step_limit / maximum(change, zero + (SC)1e-12));
-      sound = (one - refused) * (scale < one ? zero : one);
+      full_step = (one - rejected) * (scale < one ? zero : one);
     } else {
-      // with a Hessian that is not today's it is linear, at a rate that two steps show
-      refused = sound > zero ? (change < (SC)0.5 * before ? zero : one) : one;
-      enough = minimum(SQRT(maximum(tolerance * (before - change), zero)), zero + (SC)10 * tolerance);
-      scale = one; sound = sound * (one - refused);
+      rejected = full_step > zero ? (change < (SC)0.5 * last_change ? zero : one) : one;
+      small = minimum(SQRT(maximum(tolerance * (last_change - change), zero)), zero + (SC)10 * tolerance);
+      scale = one; full_step = full_step * (one - rejected);
     }
-    before = change;
-    scale *= (one - settled) * (one - refused);
+    last_change = change;
+    scale *= (one - settled) * (one - rejected);
     if (attached) UNROLL for (int c = 0; c < 3; ++c) {
       const real force = hand_force(c, scale);
       reaction[c] = settled > zero ? reaction[c] : force;
@@ -116,7 +121,7 @@ for (int step = 0; step < steps; ++step) {
       const real u = scale * DX(k, i);
       X(k, i) -= scale > zero ? u : zero;
     }
-    settled = change < enough ? maximum(settled, one - refused) : settled;
+    settled = change < small ? maximum(settled, one - rejected) : settled;
     settled = imbalance < balance ? one : settled;
     if (ALL(settled > zero)) break;
   }

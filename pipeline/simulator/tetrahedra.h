@@ -43,7 +43,7 @@ real hand_terms[2][3], hand_terms_of[2][3][N];
 
 // drag of the air on the moving band, which the projectile does not feel
 auto wind_of = [&](int i, int m) -> real { return air * (mass_of(i, m) - (i == MID ? share(m) * payload : zero)); };
-auto feel_wind = [](bool) {};  // a cylinder's drag: the rod alone knows it
+auto update_air_drag = [](bool) {};  // a cylinder's drag: the rod alone knows it
 auto wind_on = [&](int i, int m) -> real { return wind_of(i, m) * (X(m, i) - Y(m, i)); };
 auto hand_force = [&](int c, real scale) -> real {  // on the held section, after Newton's change times `scale`, to first order
   real force = hand_terms[0][c] + hand_terms[1][c];

@@ -37,8 +37,8 @@ def least_sensitive_draw(landing_map: LandingMap, target: float) -> np.ndarray:
     off = landing - target
     here = off[:-1, :-1]
     hits = grid[:-1, :-1][(here * off[1:, :-1] <= 0) | (here * off[:-1, 1:] <= 0)]
-    found = sensitivity(landing_map, hits)
-    return hits[np.nanargmin(found)] if np.isfinite(found).any() else np.full(2, np.nan)
+    slopes = sensitivity(landing_map, hits)
+    return hits[np.nanargmin(slopes)] if np.isfinite(slopes).any() else np.full(2, np.nan)
 
 
 def hit(land: Land, target: float, start: np.ndarray) -> np.ndarray:

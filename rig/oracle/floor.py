@@ -16,9 +16,9 @@ def trial_numbers(params: Params) -> np.ndarray:
     """Numbers of a floor's launches, one row a target: first the trials' own, then others."""
     trials, more = params.trials, params.floor.launches
     shape = len(trials.targets), trials.repeats
-    own = np.arange(shape[0] * shape[1]).reshape(shape)
-    others = own.size + np.arange(shape[0] * more).reshape(shape[0], more)
-    return np.hstack([own, others])
+    numbers = np.arange(shape[0] * shape[1]).reshape(shape)
+    others = numbers.size + np.arange(shape[0] * more).reshape(shape[0], more)
+    return np.hstack([numbers, others])
 
 
 def errors_of(draws: np.ndarray, landings: np.ndarray, params: Params) -> dict:
@@ -37,20 +37,20 @@ def errors_of(draws: np.ndarray, landings: np.ndarray, params: Params) -> dict:
     """
     targets = params.trials.targets
     missed = landings - np.array(targets)[:, None]
-    own = missed[:, : params.trials.repeats]
+    of_trials = missed[:, : params.trials.repeats]
     return {
         "targets": {
             repr(target): {
                 "draw": None if np.isnan(draw).any() else list(map(float, draw)),
                 **_error(miss, mine),
             }
-            for target, draw, miss, mine in zip(targets, draws, missed, own, strict=True)
+            for target, draw, miss, mine in zip(targets, draws, missed, of_trials, strict=True)
         },
-        **_error(missed, own),
+        **_error(missed, of_trials),
     }
 
 
-def _error(missed: np.ndarray, own: np.ndarray) -> dict:
+def _error(missed: np.ndarray, of_trials: np.ndarray) -> dict:
     landed = missed[np.isfinite(missed)]
     size = np.abs(landed)
     return {
@@ -59,7 +59,7 @@ def _error(missed: np.ndarray, own: np.ndarray) -> dict:
         "bias_m": _mean(landed),
         "launches": missed.size,
         "failed": missed.size - len(landed),
-        "trials_mean_error_m": _mean(np.abs(own[np.isfinite(own)])),
+        "trials_mean_error_m": _mean(np.abs(of_trials[np.isfinite(of_trials)])),
     }
 
 

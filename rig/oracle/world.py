@@ -62,16 +62,16 @@ class World:
         """Where T draws (T, 2) land with the errors of trials (T, N) [m], NaN where one fails."""
         shape = np.shape(numbers)
         every = self.trials(np.repeat(draws, shape[1], axis=0), np.ravel(numbers).tolist())
-        landing = [one.landing_y if one.failure is None else np.nan for one in every]
+        landing = [trial.landing_y if trial.failure is None else np.nan for trial in every]
         return np.reshape(landing, shape)
 
     def exact(self, draws: np.ndarray) -> ExactLaunches:
         """Launches without errors from draws (N, 2) [m]."""
         every = self.trials(draws, [None] * len(draws))
         return ExactLaunches(
-            landing_y=np.array([one.landing_y for one in every]),
-            hold_force=np.array([one.hold_force for one in every]),
-            failure=[None if np.isfinite(one.landing_y) else one.failure for one in every],
+            landing_y=np.array([trial.landing_y for trial in every]),
+            hold_force=np.array([trial.hold_force for trial in every]),
+            failure=[None if np.isfinite(trial.landing_y) else trial.failure for trial in every],
         )
 
     def landing_map(self, setup: SetupParams, size: tuple[int, int]) -> LandingMap:

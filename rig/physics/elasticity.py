@@ -170,10 +170,10 @@ def at(number: int, stretch: float, constants: Sequence[float]) -> Point:
 @compiled
 def _over(number: int, stretches: np.ndarray, constants: np.ndarray) -> np.ndarray:
     """`at` of each stretch (N,), shape (3, N)."""
-    found = np.empty((3, len(stretches)))
+    values = np.empty((3, len(stretches)))
     for i in range(len(stretches)):
-        found[0, i], found[1, i], found[2, i] = at(number, stretches[i], constants)
-    return found
+        values[0, i], values[1, i], values[2, i] = at(number, stretches[i], constants)
+    return values
 
 
 @dataclass(frozen=True)
@@ -190,8 +190,8 @@ class Law:
 
     def _points(self, stretch: np.ndarray) -> np.ndarray:
         flat = np.ascontiguousarray(stretch, float).ravel()
-        found = _over(NUMBERS[self.name], flat, np.array(self.constants))
-        return found.reshape(3, *np.shape(stretch))
+        values = _over(NUMBERS[self.name], flat, np.array(self.constants))
+        return values.reshape(3, *np.shape(stretch))
 
     def stress(self, stretch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Nominal stress P [MPa] and its derivative by stretch, shapes as given."""

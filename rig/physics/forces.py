@@ -98,11 +98,11 @@ def middle_forces(states: np.ndarray, band: BandNumbers) -> np.ndarray:
     """Of states (S, nodes, 6 + M) those on the middle node, shape (S, 3) [N]."""
     nodes = len(band.masses)
     force, forgetting = np.empty((nodes, 3)), np.empty((nodes, states.shape[2] - 6))
-    found = np.empty((len(states), 3))
+    result = np.empty((len(states), 3))
     for i in range(len(states)):
         forces(states[i], force, forgetting, band)
-        found[i] = force[nodes // 2]
-    return found
+        result[i] = force[nodes // 2]
+    return result
 
 
 @compiled
@@ -140,15 +140,15 @@ def slopes(
     band, hand = data[0], data[1]
     nodes, colours, width = jacobian.shape[:3]
     moved = y.copy().reshape((nodes, width))
-    base, found = np.empty((nodes, width)), np.empty((nodes, width))
+    base, raised = np.empty((nodes, width)), np.empty((nodes, width))
     change(time, moved, base, band, hand)
     for c in range(width):
         for colour in range(colours):
             moved[colour::colours, c] += NUDGE
-            change(time, moved, found, band, hand)
+            change(time, moved, raised, band, hand)
             for j in range(colour, nodes, colours):
                 moved[j, c] = y[j * width + c]
                 for i in range(max(j - NEAR, 0), min(j + NEAR + 1, nodes)):
                     for r in range(width):
-                        slope = (found[i, r] - base[i, r]) / NUDGE
+                        slope = (raised[i, r] - base[i, r]) / NUDGE
                         jacobian[i, j - i + NEAR, r, c] = slope

@@ -102,14 +102,14 @@ def _solved(
     """Write z."""
     nodes, width = len(jacobian), jacobian.shape[2]
     size = 3 * nodes
-    right, given, found = np.empty(size), r.reshape((nodes, width)), z.reshape((nodes, width))
-    found[:] = given
+    right, given, solution = np.empty(size), r.reshape((nodes, width)), z.reshape((nodes, width))
+    solution[:] = given
     for e in range(nodes - 1):  # the memories if no node had another velocity
         for k in range(width - 6):
             for n in range(2):
                 for c in range(3):
-                    found[e, 6 + k] += gamma * jacobian[e, NEAR + n, 6 + k, c] * given[e + n, c]
-        _forgotten(jacobian, e, gamma, found[e, 6:])
+                    solution[e, 6 + k] += gamma * jacobian[e, NEAR + n, 6 + k, c] * given[e + n, c]
+        _forgotten(jacobian, e, gamma, solution[e, 6:])
     for i in range(nodes):
         for a in range(3):
             value = 0.0
@@ -119,7 +119,7 @@ def _solved(
                         value += jacobian[i, j - i + NEAR, 3 + a, c] * given[j, c]
                 for e in range(i - 1, i + 1):
                     for k in range(width - 6):
-                        value += jacobian[i, e - i + NEAR, 3 + a, 6 + k] * found[e, 6 + k]
+                        value += jacobian[i, e - i + NEAR, 3 + a, 6 + k] * solution[e, 6 + k]
             right[3 * i + a] = given[i, 3 + a] + gamma * value
     for p in range(size):
         for q in range(max(p - REACH, 0), p):
@@ -130,11 +130,11 @@ def _solved(
         right[p] /= factors[p, REACH]
     for i in range(1, nodes - 1):
         for c in range(3):
-            found[i, 3 + c] = right[3 * i + c]
-            found[i, c] += gamma * right[3 * i + c]
+            solution[i, 3 + c] = right[3 * i + c]
+            solution[i, c] += gamma * right[3 * i + c]
     for e in range(nodes - 1):
         for n in range(2):
             if 0 < e + n < nodes - 1:
                 for k in range(width - 6):
                     for c in range(3):
-                        found[e, 6 + k] += gamma * memories[e, n, k, c] * right[3 * (e + n) + c]
+                        solution[e, 6 + k] += gamma * memories[e, n, k, c] * right[3 * (e + n) + c]

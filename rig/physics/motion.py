@@ -56,30 +56,30 @@ def place(time: float, path: Path) -> np.ndarray:
     duration = path.times[leg + 1] - path.times[leg]
     part = (time - path.times[leg]) / duration
     shape = part**2 * (3 - 2 * part), 6 * part * (1 - part), 6 - 12 * part
-    found = np.empty((3, 3))
+    rows = np.empty((3, 3))
     for c in range(3):
         way = path.points[leg + 1, c] - path.points[leg, c]
-        found[0, c] = path.points[leg, c] + way * shape[0]
-        found[1, c], found[2, c] = way * shape[1] / duration, way * shape[2] / duration**2
+        rows[0, c] = path.points[leg, c] + way * shape[0]
+        rows[1, c], rows[2, c] = way * shape[1] / duration, way * shape[2] / duration**2
         for tone in range(len(path.frequency)):
             rate, size = 2 * np.pi * path.frequency[tone, 0], path.amplitude[tone, c]
             sine, cosine = (
                 np.sin(rate * time + path.phase[tone, c]),
                 np.cos(rate * time + path.phase[tone, c]),
             )
-            found[0, c] += size * sine
-            found[1, c] += size * rate * cosine
-            found[2, c] -= size * rate**2 * sine
-    return found
+            rows[0, c] += size * sine
+            rows[1, c] += size * rate * cosine
+            rows[2, c] -= size * rate**2 * sine
+    return rows
 
 
 @compiled
 def places(times: np.ndarray, path: Path) -> np.ndarray:
     """`place` at times (T,), shape (T, 3, 3)."""
-    found = np.empty((len(times), 3, 3))
+    rows = np.empty((len(times), 3, 3))
     for i in range(len(times)):
-        found[i] = place(times[i], path)
-    return found
+        rows[i] = place(times[i], path)
+    return rows
 
 
 @dataclass(frozen=True)

@@ -230,7 +230,7 @@ class Rubber:
 
     @cached_property
     def material(self) -> Material:
-        part = lambda one: np.empty(0) if one is None else np.array(astuple(one), float)  # noqa: E731
+        part = lambda section: np.empty(0) if section is None else np.array(astuple(section), float)  # noqa: E731
         return Material(
             elasticity.NUMBERS[self.law.name],
             np.array(self.law.constants, float),
@@ -288,17 +288,17 @@ class Rubber:
             Those of rubber that was held for ever at each stretch, and what is remembered: (T, M).
         """
         stress = self.law.stress(stretch)[0]
-        held, found = [], []
+        held, stresses = [], []
         if self.flow is not None:
             held.append(np.log(stretch))
-            found.append(self._flowed(stretch, step))
+            stresses.append(self._flowed(stretch, step))
         if self.softening is not None:
             energy = self.law.energy(stretch)
             before = self.law.energy(worst)  # pyright: ignore[reportArgumentType]
             most = np.maximum.accumulate(np.maximum(energy, before))
             stress = stress * self._kept(energy, most)
             held.append(energy)
-            found.append(most)
+            stresses.append(most)
         decay = np.exp(-step / self.times)
         mean = self.times / step * (1 - decay)
         memory = np.empty((len(stress), len(self.times)))
@@ -307,7 +307,7 @@ class Rubber:
             start, end = stress[i - 1], stress[i]
             memory[i] = decay * memory[i - 1] + (mean - decay) * start + (1 - mean) * end
         relaxed = np.repeat(stress[:, None], len(self.times), axis=1)
-        return np.column_stack([relaxed, *held]), np.column_stack([memory, *found])
+        return np.column_stack([relaxed, *held]), np.column_stack([memory, *stresses])
 
     def _flowed(self, stretch: np.ndarray, step: float) -> np.ndarray:
         """e along a history (T,) of equal steps [s]."""

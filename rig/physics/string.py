@@ -197,7 +197,7 @@ class ElasticString:
         def value(time: float, flat: np.ndarray, out: np.ndarray, data: object) -> None:
             out[0] = event(time, flat.reshape(shape))  # pyright: ignore[reportOptionalCall]
 
-        found, states = integrated(
+        times_there, states = integrated(
             forces.rates,
             y.ravel(),
             times,
@@ -208,7 +208,7 @@ class ElasticString:
             linsolver="gmres",
             precond=CVODEPrecond(newton.setup, newton.solve),
         )
-        return found, states.reshape(-1, *shape)
+        return times_there, states.reshape(-1, *shape)
 
     def at_rest(
         self,

@@ -159,8 +159,8 @@ def measured_depth(picture: Exposure, settings: RigCamera, rng: np.random.Genera
     because one moves through it, some pixels are lost and some fly between the two.
     """
     depth, near, far = (
-        np.where(one < settings.range, one, 0).astype(np.float32)
-        for one in (picture.depth, picture.nearest, picture.furthest)
+        np.where(distance < settings.range, distance, 0).astype(np.float32)
+        for distance in (picture.depth, picture.nearest, picture.furthest)
     )
     near = np.stack([near, np.roll(near, 1, axis=0), np.roll(near, 1, axis=1)]).min(axis=0)
     far = np.stack([far, np.roll(far, 1, axis=0), np.roll(far, 1, axis=1)]).max(axis=0)

@@ -11,7 +11,7 @@ from pipeline.base.layout import Layout
 from pipeline.identify.results.theta import load_theta
 from pipeline.launching.surface.simulator import simulator
 from sling2sim2real import Band, LaunchHistory, Model, Mounting, Settings, Theta
-from sling2sim2real.model import known
+from sling2sim2real.model import with_band
 
 DRAWS = np.array([[-0.30, -0.15], [-0.35, -0.20]])
 EXTRA = {"air_drag": 0.5, "turn_damping": 0.2, "returned_share": 0.97}
@@ -29,7 +29,7 @@ def test_launches_are_those_of_a_run_with_the_same_theta_file(world, tmp_path, s
     mounting.parent.mkdir(parents=True)
     mounting.write_text(model.mounting.model_dump_json())
     content = model.theta.content("band", HISTORY)
-    theirs = simulator(known(model.settings, model.band), "band", content, root=tmp_path)(DRAWS)
+    theirs = simulator(with_band(model.settings, model.band), "band", content, root=tmp_path)(DRAWS)
     ours = model.launches(DRAWS)
     assert np.array_equal(ours.landing_y, theirs.landing_y)
     assert not np.array_equal(world.launches(DRAWS).landing_y, ours.landing_y)

@@ -43,7 +43,7 @@ from validation.campaigns.rig_scores import (
 )
 from validation.campaigns.runner import OURS, PAPER, ResultLines, plain, result_of
 from validation.campaigns.variants import priors_of, with_variants
-from validation.density import Calibrated, found
+from validation.density import Calibrated, calibrated_by
 from validation.marked import marks, with_block
 from validation.orange import NAME as ORANGE
 from validation.orange import landings, with_orange
@@ -177,7 +177,7 @@ def identified(job: Job, work: Path, orange: Path | None) -> dict:
     friction = params.methods[OURS].fixed["dynamic_friction"]
     sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
     with priors_of(job.method), less_trust(job.method):
-        outcome, confidence = found(params, method, sling, [episode])
+        outcome, confidence = calibrated_by(params, method, sling, [episode])
     if job.group == "orange":
         scores = against_given(outcome, params, *landings(Path(orange or ".")))
     else:

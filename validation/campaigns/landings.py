@@ -47,7 +47,7 @@ from validation.campaigns.rig_scores import (
     summary,
 )
 from validation.campaigns.runner import OURS, PAPER, ResultLines, plain, result_of
-from validation.density import Calibrated, found
+from validation.density import Calibrated, calibrated_by
 from validation.marked import marks, with_block
 from validation.projects import DEFAULTS
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
@@ -129,11 +129,11 @@ def identified(job: OneRecording, work: Path, keep: bool = False) -> dict:
     folder = work / fingerprint(repr(job))
     episode = recorded(params, job.band, folder)
     sling, start = sling_of(params, job.band, job.method, folder), time.process_time()
-    outcome, confidence = found(params, job.method, sling, [episode])
+    outcome, confidence = calibrated_by(params, job.method, sling, [episode])
     with World(job.band, saved(params, folder / "params.yaml"), workers=1) as world:
         if job.launched:
             observed = measured(outcome, params, world, job.number)
-            outcome, confidence = found(params, job.method, sling, [episode], observed)
+            outcome, confidence = calibrated_by(params, job.method, sling, [episode], observed)
         seconds = time.process_time() - start
         scores = scored(outcome, params, world, seed=job.number)
     if not keep:

@@ -43,7 +43,7 @@ from pipeline.params import Params, expect_known, load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
 from validation.campaigns.runner import OURS, PAPER
-from validation.density import found
+from validation.density import calibrated_by
 
 FOLDER, TWICE = Path("reports/validation/machines"), Path("reports/validation/twice.json")
 COMMITTED, TABLE = Path(), Path("reports/tables/table1.csv")
@@ -90,7 +90,7 @@ def identified(band: str, method: str, root: Path, device: str) -> dict:
     devices, start = named(device, "--device"), time.perf_counter()
     sling = sling_of_method(params, band, method, root)
     episode = Episode.load(Layout(root).episode(band))
-    outcome, _ = found(params, method, sling, [episode], devices=devices)
+    outcome, _ = calibrated_by(params, method, sling, [episode], devices=devices)
     seconds = time.perf_counter() - start
     loss = EpisodeLoss.of(params, method, episode, sling)
     terms = loss.terms(interact(sling, episode, outcome.theta, device=devices[0], fetch=False))

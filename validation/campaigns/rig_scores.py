@@ -28,7 +28,7 @@ from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.world import World
 from rig.physics.launch import launch
 from validation.campaigns.runner import OURS
-from validation.density import Calibrated, found
+from validation.density import Calibrated, calibrated_by
 
 TARGETS = np.linspace(1.525, 2.325, 9)  # m
 MAP = 17, 13  # simulated launches that tell where to seek
@@ -103,7 +103,7 @@ def identified(
     if recorded_pads:
         friction = params.methods[OURS].fixed["dynamic_friction"]
         sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
-    outcome, confidence = found(params, method, sling, [episode])
+    outcome, confidence = calibrated_by(params, method, sling, [episode])
     seconds, names = time.perf_counter() - start, SearchBox.of_method(params, method).names
     theta = {name: outcome.identified[name] for name in names}
     return RigIdentification(outcome, confidence, theta, seconds)

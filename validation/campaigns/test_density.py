@@ -41,7 +41,7 @@ def test_recordings_that_this_project_did_not_make(params: Params, progress, rec
     ]:
         place = FOLDER / (name if name in names else names[0])
         sling = sling_of(params, "orange", OURS, place)
-        calibrated, confidence = density.found(params, OURS, sling, own)
+        calibrated, confidence = density.calibrated_by(params, OURS, sling, own)
         error = calibrated(draws).landing_y / measured - 1
         ends = landing_intervals(calibrated, draws, calibrated.samples, 1e-3)
         figures[name] = {

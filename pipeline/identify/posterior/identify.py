@@ -130,7 +130,7 @@ def fit_posterior(
                 " fitted",
                 file=sys.stderr,
             )
-    birge = disagreement(fitted)
+    birge = birge_ratio(fitted)
     rng = np.random.default_rng(params.optimizer.seed)
     samples = samples_around(fitted, coordinates, birge, rng)
     return Identified(coordinates, fitted, birge, samples, recordings, launches)
@@ -164,7 +164,7 @@ def recorded_history(sling: ClampedBand, episodes: Sequence[Episode]) -> LaunchH
     return LaunchHistory(pull_history["pull_time"], pull_history["pause"], deepest_draw(episodes))
 
 
-def disagreement(fitted: Fit) -> float:
+def birge_ratio(fitted: Fit) -> float:
     """Birge's ratio of N recordings, at least 1: how far each alone would go from the mode.
 
     Of each, the drop of its misfit to its own least is chi squared of D' D (N - 1)/N coordinates
@@ -174,12 +174,11 @@ def disagreement(fitted: Fit) -> float:
         return 1.0
     total = freedom = 0.0
     for expansion in fitted.expansions:
-        inverse = np.linalg.inv(
-            expansion.hessian + fitted.hessian
-        )  # regular where it alone tells nothing
-        summary = np.linalg.solve(fitted.hessian, expansion.hessian)
+        # The sum is regular where the recording alone shows nothing.
+        inverse = np.linalg.inv(expansion.hessian + fitted.hessian)
+        share = np.linalg.solve(fitted.hessian, expansion.hessian)
         total += expansion.gradient @ inverse @ expansion.gradient
-        freedom += np.trace(inverse @ expansion.hessian @ (np.eye(len(summary)) - summary))
+        freedom += np.trace(inverse @ expansion.hessian @ (np.eye(len(share)) - share))
     return float(np.sqrt(max(total / max(freedom, 1e-9), 1.0)))
 
 
@@ -294,12 +293,12 @@ def _left(identified: Identified, number: int) -> dict:
     entry |= {"recoil_rms": expansion.rms("recoil"), "pictures": expansion.pictures}
     entry["source"] = recording.episode.metadata.get("input", {})
     if len(identified.recordings) > 1:
-        entry["without_it"] = without(identified, number)
+        entry["without_it"] = leave_one_out(identified, number)
     return entry
 
 
-def without(identified: Identified, number: int) -> dict:
-    """How the mode of all other evidence predicts a recording, by their quadratics."""
+def leave_one_out(identified: Identified, number: int) -> dict:
+    """How the mode of all other evidence predicts the one left out, by their quadratics."""
     expansion = identified.fit.expansions[number]
     hessian, gradient = (
         identified.fit.hessian - expansion.hessian,

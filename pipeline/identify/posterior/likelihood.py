@@ -307,34 +307,45 @@ class Likelihood:
         nuisance_slopes: np.ndarray,
         nuisances: np.ndarray,
     ) -> Expansion:
-        has = self.tolerances
+        """Eliminate the nuisances n: a Schur complement of the Gauss-Newton matrix.
+
+        Columns of the Jacobian J, over the residuals' spread: D of phi, three of the simulated n,
+        M of the linear n. With the precisions of n's priors on the diagonal,
+
+            J' J = [A  B]      hessian = A - B C^-1 B'      best n = C^-1 (c - B' d)
+                   [B' C]      gradient = a - B C^-1 c
+
+        with (a, c) = J' times what is left of the residuals. In `misfit` the linear n are at their
+        best, and the simulated ones where the rollout was made.
+        """
+        tolerances = self.tolerances
         linear = self._linear(residuals, gap, nuisance_slopes[SIMULATED.index("camera")])
         # Of the camera's clock `moved` was taken beforehand, and belongs to what its prior judges.
         nuisances = nuisances + self.moved * (np.array(SIMULATED) == "camera")
-        weight = 1 / residuals.spread(has.force, has.cloud, has.way)
-        count, inner = len(slopes), len(SIMULATED)
+        weight = 1 / residuals.spread(tolerances.force, tolerances.cloud, tolerances.way)
+        of_phi, simulated = len(slopes), len(SIMULATED)
         design = np.concatenate([slopes, nuisance_slopes, linear]) * weight  # (D + 3 + M, R)
         left = -gap * weight
-        gram, slope = design @ design.T, design @ left
-        n = slice(count, count + inner)
-        gram[n, n] += np.diag(has.simulated**-2)
-        slope[n] -= nuisances / has.simulated**2
-        rest = np.arange(count + inner, len(gram))
-        gram[rest, rest] += 1.0
-        cost = left @ left + np.sum((nuisances / has.simulated) ** 2)
-        solved = np.linalg.solve(gram[np.ix_(rest, rest)], slope[rest])
-        misfit = cost - slope[rest] @ solved
-        outer = slice(count, None)
-        inverse = np.linalg.inv(gram[outer, outer])
-        best, change = inverse @ slope[outer], -inverse @ gram[outer, :count]
+        gram, right = design @ design.T, design @ left
+        n = slice(of_phi, of_phi + simulated)
+        gram[n, n] += np.diag(tolerances.simulated**-2)
+        right[n] -= nuisances / tolerances.simulated**2
+        m = np.arange(of_phi + simulated, len(gram))  # linear, in units of their tolerances
+        gram[m, m] += 1.0
+        cost = left @ left + np.sum((nuisances / tolerances.simulated) ** 2)
+        best_linear = np.linalg.solve(gram[np.ix_(m, m)], right[m])
+        every_nuisance = slice(of_phi, None)
+        inverse = np.linalg.inv(gram[every_nuisance, every_nuisance])  # C^-1
+        coupling = gram[:of_phi, every_nuisance]  # B
+        best, change = inverse @ right[every_nuisance], -inverse @ gram[every_nuisance, :of_phi]
         return Expansion(
-            misfit=float(misfit),
-            hessian=gram[:count, :count] + gram[:count, outer] @ change,
-            gradient=slope[:count] - gram[:count, outer] @ best,
-            nuisances=(best[:inner], change[:inner]),
-            spread=np.sqrt(np.diag(inverse)[:inner]),
+            misfit=float(cost - right[m] @ best_linear),
+            hessian=gram[:of_phi, :of_phi] + coupling @ change,
+            gradient=right[:of_phi] - coupling @ best,
+            nuisances=(best[:simulated], change[:simulated]),
+            spread=np.sqrt(np.diag(inverse)[:simulated]),
             residuals=residuals,
-            left=(left - solved @ design[rest]) / weight,
+            left=(left - best_linear @ design[m]) / weight,
         )
 
     def _linear(self, residuals: Residuals, gap: np.ndarray, camera: np.ndarray) -> np.ndarray:

@@ -210,8 +210,8 @@ class _Chooser:
                 pixels = f", {size[0]} x {size[1]}" if size else ""
                 self.problems.append(
                     f"{candidate.topic} is of frame {info_frame!r}, {camera.width} x"
-                    f" {camera.height} pixels, {topic} of {frame!r}{pixels}: record the camera info of those images, or"
-                    f" name it in setup.topics.{role}_info"
+                    f" {camera.height} pixels, {topic} of {frame!r}{pixels}: record the camera info"
+                    f" of those images, or name it in setup.topics.{role}_info"
                 )
         if not ranked:
             return None

@@ -51,7 +51,7 @@ def animate(
     with replacing(path) as temporary:
         frames[0].save(
             temporary, format="webp", save_all=True, append_images=frames[1:], loop=0,
-            duration=[round(one) for one in lasts], quality=QUALITY, method=4,
+            duration=[round(last) for last in lasts], quality=QUALITY, method=4,
         )  # fmt: skip
 
 

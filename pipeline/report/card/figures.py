@@ -76,11 +76,11 @@ def force(episode: Episode, simulated: Simulated) -> Figure:
         sharey="row",
     )  # fmt: skip
     for top, bottom in axes.T:
-        for one, style in (
+        for rollouts, style in (
             (episode.force, {"color": INK, "lw": 2.4}),
             (simulated.force, {"color": SIMULATED, "lw": 1.2}),
         ):
-            top.plot(episode.time, np.linalg.norm(one, axis=1), **style)
+            top.plot(episode.time, np.linalg.norm(rollouts, axis=1), **style)
         for axis, dashes in ((1, "-"), (2, ":")):
             gap = episode.force[:, axis] - simulated.force[:, axis]
             bottom.plot(episode.time, gap, color=INK, lw=1.1, ls=dashes)
@@ -106,24 +106,29 @@ def force(episode: Episode, simulated: Simulated) -> Figure:
 @picture(dpi=110)
 def values(shown: list[ShownValue], boxes: dict[str, SearchedRange]) -> Figure:
     """Each searched value's interval as a bar within its box, which is given by name."""
-    rows = [one for one in shown if one.name in boxes and one.low is not None]
+    rows = [value for value in shown if value.name in boxes and value.low is not None]
     figure, ax = plt.subplots(figsize=(WIDTH, 0.62 * max(len(rows), 1) + 0.9))
-    for row, one in enumerate(rows):
-        assert one.low is not None and one.high is not None  # both are known, or neither is
-        box, factor = boxes[one.name], QUANTITIES[one.name].factor
+    for row, quantity in enumerate(rows):
+        assert (
+            quantity.low is not None and quantity.high is not None
+        )  # both are known, or neither is
+        box, factor = boxes[quantity.name], QUANTITIES[quantity.name].factor
         box = SearchedRange(factor * box.low, factor * box.high, box.scale)
-        begin, end = box.place(one.low), box.place(one.high)
+        begin, end = box.place(quantity.low), box.place(quantity.high)
         ax.barh(row, 1, height=0.3, color="0.95", zorder=1)
-        if one.prior:
-            before = np.sort([box.place(end) for end in one.prior])
+        if quantity.prior:
+            before = np.sort([box.place(end) for end in quantity.prior])
             ax.barh(row, np.ptp(before), left=before[0], height=0.3, color="0.86", zorder=1)
         ax.barh(row, end - begin, left=begin, height=0.3, color=BARS, alpha=0.55, zorder=2)
-        ax.plot([box.place(one.value)] * 2, [row - 0.15, row + 0.15], color=INK, lw=2, zorder=3)
+        ax.plot(
+            [box.place(quantity.value)] * 2, [row - 0.15, row + 0.15], color=INK, lw=2, zorder=3
+        )
         for side, bound in ((0, box.low), (1, box.high)):
             at = side + 0.02 * (2 * side - 1), row
             words = {"fontsize": 8, "color": "0.45", "va": "center"}
             ax.text(*at, f"{rounded(bound):.6g}", ha=("right", "left")[side], **words)
-        text = f"{one.label}: {one.value:g} ({one.low:g} to {one.high:g}) {one.unit}"
+        ends = f"({quantity.low:g} to {quantity.high:g})"
+        text = f"{quantity.label}: {quantity.value:g} {ends} {quantity.unit}"
         ax.text(0, row - 0.22, text, va="bottom", fontsize=9)
     ax.set(xlim=(-0.1, 1.12), xticks=[], yticks=[], ylim=(len(rows) - 0.7, -0.75))
     ax.grid(False)

@@ -33,7 +33,7 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
     recordings = confidence.get("recordings", [])
 
     def worst(name: str) -> float:
-        return max((one[name] for one in recordings), default=0.0)
+        return max((recording[name] for recording in recordings), default=0.0)
 
     launched = inputs.launched
     scored = launched.loc[launched.stretch <= FURTHER * inputs.recorded_stretch]
@@ -41,8 +41,8 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
     landing, low, high = (scored[n] for n in ("landing_y", "predicted_low", "predicted_high"))
     off, share = landing - scored.predicted_y, landing / scored.predicted_y - 1
     evidence = confidence.get("launches", [])
-    unlikely = [one.get("z_without_it") for one in evidence]
-    left = [abs(one["left"]) for one in evidence if one["left"] is not None]
+    unlikely = [launch.get("z_without_it") for launch in evidence]
+    left = [abs(launch["left"]) for launch in evidence if launch["left"] is not None]
     miss = np.abs(aims.landing - aims.target)
     return Findings(
         cautions=_cautions(inputs.episodes),
@@ -50,7 +50,7 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
         force=worst("force_rms"),
         held=worst("held_rms"),
         recoil=worst("recoil_rms"),
-        recoil_seen=any(one["pictures"] for one in recordings) or not recordings,
+        recoil_seen=any(recording["pictures"] for recording in recordings) or not recordings,
         disagreement=confidence.get("disagreement", 1.0),
         odd=_odd(recordings),
         at_sides=_at_sides(inputs),
@@ -78,7 +78,9 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
         surprising=sum(abs(z) > OUTSIDE for z in unlikely if z is not None),
         carried=None if force is None else carried(inputs.episode, force),
         density=_density(inputs.params, inputs.band),
-        unloaded=any(NO_UNLOADING not in unseen(phases_of_hand(one)) for one in inputs.episodes),
+        unloaded=any(
+            NO_UNLOADING not in unseen(phases_of_hand(episode)) for episode in inputs.episodes
+        ),
     )
 
 
@@ -111,29 +113,29 @@ def _density(params: Params, band: str) -> float | None:
 
 def _cautions(episodes: list[Episode]) -> list[tuple[str, str]]:
     """What of each pull's recording costs accuracy, and what to do about it: sentences."""
-    found = []
+    cautions = []
     for episode in episodes:
         source = episode.metadata["input"]
         pull = f"pull {source.get('pull', 1)} of {as_code(source['file'])}"
-        for one in episode.cautions:
-            cure = as_text(one["cure"])
-            sentences = f"In {pull}, {as_text(one['what'])}.", f"For {pull}: {cure}."
-            found.append(sentences)
-    return found
+        for caution in episode.cautions:
+            cure = as_text(caution["cure"])
+            sentences = f"In {pull}, {as_text(caution['what'])}.", f"For {pull}: {cure}."
+            cautions.append(sentences)
+    return cautions
 
 
 def _odd(recordings: list[dict]) -> str:
     """File and pull that all others predict worst; "" of fewer than two."""
-    predicted = [one for one in recordings if "without_it" in one]
+    predicted = [recording for recording in recordings if "without_it" in recording]
     if not predicted:
         return ""
-    source = max(predicted, key=lambda one: one["without_it"]["misfit"])["source"]
+    source = max(predicted, key=lambda recording: recording["without_it"]["misfit"])["source"]
     return f"pull {source.get('pull', 1)} of {as_code(source.get('file', '?'))}"
 
 
 def _at_sides(inputs: CardInputs) -> list[tuple[str, str]]:
     """Searched parameters at a side of their box that nature does not set: label and side."""
-    found, searched = [], boxes(inputs.params, inputs.method)
+    at_sides, searched = [], boxes(inputs.params, inputs.method)
     for name, value in inputs.theta["theta"].items():
         if name not in searched:
             continue
@@ -142,9 +144,9 @@ def _at_sides(inputs: CardInputs) -> list[tuple[str, str]]:
         sides = {"lower": place < SIDE and box.low != 0, "upper": place > 1 - SIDE}
         quantity = QUANTITIES[name]
         ends = " to ".join(f"{rounded(quantity.factor * x):.6g}" for x in (box.low, box.high))
-        found += [
+        at_sides += [
             (quantity.label, f"{side} side of its box, {f'{ends} {quantity.unit}'.strip()}")
             for side, there in sides.items()
             if there
         ]
-    return found
+    return at_sides

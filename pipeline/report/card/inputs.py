@@ -88,7 +88,7 @@ class CardInputs:
 
     @property
     def recordings(self) -> list[str]:
-        return list(dict.fromkeys(one.metadata["input"]["file"] for one in self.episodes))
+        return list(dict.fromkeys(recorded.metadata["input"]["file"] for recorded in self.episodes))
 
     @property
     def launched(self) -> pd.DataFrame:
@@ -98,13 +98,15 @@ class CardInputs:
 
 def card_inputs(params: Params, band: str, method: str, root: str | Path = ".") -> CardInputs:
     """Read and launch. Raises UserError where an input is missing."""
-    layout, about = Layout(Path(root)), params.bands[band]
+    layout, band_params = Layout(Path(root)), params.bands[band]
     theta = load_theta(layout.theta(band, method), band)
     path = layout.confidence(band, method)
     samples = load_samples(path, parameters_of(theta))
     stored = Stored(band, method, layout.root)
     episodes = Episode.load_all(layout.episodes(band))
-    stretch = partial(stretch_of, fork_width=params.setup.fork_width, rest_length=about.rest_length)
+    stretch = partial(
+        stretch_of, fork_width=params.setup.fork_width, rest_length=band_params.rest_length
+    )
     launcher = simulator(params, band, theta, root=root)
     target = np.array(params.trials.targets, float)
     return CardInputs(
@@ -118,7 +120,9 @@ def card_inputs(params: Params, band: str, method: str, root: str | Path = ".") 
         policy=stored.card(),
         trials=pd.read_parquet(made(layout.trials(band, method))),
         aims=aims(launcher, target, stored.draws(target), samples, stretch, params),
-        recorded_stretch=recorded_stretch(episodes, params.setup.fork_width, about.rest_length),
+        recorded_stretch=recorded_stretch(
+            episodes, params.setup.fork_width, band_params.rest_length
+        ),
     )
 
 

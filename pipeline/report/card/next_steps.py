@@ -57,10 +57,10 @@ def next_steps(
         unloaded: Whether any pull shows how the band unloads.
     """
     cures = [question, *(reason.cure for reason in reasons)]
-    found = list(dict.fromkeys(filter(None, cures)))
+    steps = list(dict.fromkeys(filter(None, cures)))
     mended_first = any(reason.against and reason.cure for reason in reasons)
     if not (unloaded or launches or mended_first or (model and DIP[0] in model.names)):
-        found.append(f"{A_DIP}, which a launch depends on.")
+        steps.append(f"{A_DIP}, which a launch depends on.")
     if model is not None and not mended_first:
         aim = len(targets) // 2
         before = model.half_width[aim]
@@ -69,20 +69,20 @@ def next_steps(
         gains = _gains(model, aim, episodes, unloaded)
         for gain in sorted(gains, key=lambda gain: gain.width):
             if gain.width < (1 - LEAST) * before:
-                found.append(gain.text.format(**words, after=f"±{_cm(gain.width)} cm"))
-    if not found:
-        found.append("Nothing more would narrow the landings by much: launch.")
-    return found[:MOST]
+                steps.append(gain.text.format(**words, after=f"±{_cm(gain.width)} cm"))
+    if not steps:
+        steps.append("Nothing more would narrow the landings by much: launch.")
+    return steps[:MOST]
 
 
 def _gains(
     model: LandingModel, aim: int, episodes: Sequence[Episode], unloaded: bool
 ) -> Iterator[Gain]:
-    one, more = (model.after(model.launched(aim, TAPE, count))[aim] for count in (1, LAUNCHES))
+    single, more = (model.after(model.launched(aim, TAPE, count))[aim] for count in (1, LAUNCHES))
     yield Gain(
         "Measure {a} launch and tell it with `sling observe --band {band}`: {before} {at} become"
         f" {{after}}, with {LAUNCHES} launches ±{_cm(more)} cm.",
-        one,
+        single,
     )
     if not unloaded and DIP[0] in model.names:
         yield Gain(

@@ -95,7 +95,7 @@ def launched(trials: pd.DataFrame, aims: Aims) -> list[dict]:
     Args:
         trials: As the stage `trials` has them.
     """
-    found = []
+    flights = []
     for target, draw, ends in zip(aims.target, aims.draw, aims.interval, strict=True):
         if not np.isfinite(draw).all():
             continue
@@ -105,7 +105,7 @@ def launched(trials: pd.DataFrame, aims: Aims) -> list[dict]:
             np.stack([y, z], axis=1) for y, z in zip(flown.flight_y, flown.flight_z, strict=True)
         ]
         landings = [way[-1, 0] for way in ways] or rows.landing_y.dropna().tolist()
-        found.append(
+        flights.append(
             {
                 "target": _whole(target),
                 "draw": _whole(draw),
@@ -116,7 +116,7 @@ def launched(trials: pd.DataFrame, aims: Aims) -> list[dict]:
                 "kind": str(rows.kind.iloc[0]) if len(rows) else "predicted",
             }
         )
-    return found
+    return flights
 
 
 def step(way: np.ndarray) -> float:

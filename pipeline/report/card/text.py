@@ -18,39 +18,39 @@ GLOSSARY = "../../../docs/glossary.md"
 SAID = {TRUSTED: "can be trusted", CARE: "use with care", NO: "do not use it"}
 
 
-def reasons_of(found: Findings, reasons: list[Reason]) -> list[str]:
+def reasons_of(findings: Findings, reasons: list[Reason]) -> list[str]:
     """Sentences: what speaks against; of a trusted band, why it can be trusted."""
     if reasons:
-        return [one.text for one in sorted(reasons, key=lambda one: not one.against)]
+        return [reason.text for reason in sorted(reasons, key=lambda reason: not reason.against)]
     notes = [
-        f"The fit settled, and the simulation meets the recording: {_met(found)}.",
-        f"Launches stretch the band to {found.stretch:.2f} times its length, within the recorded"
-        f" {found.recorded_stretch:.2f}.",
-        f"Landings are known to ±{100 * found.half_width:.0f} cm or better.",
+        f"The fit settled, and the simulation meets the recording: {_met(findings)}.",
+        f"Launches stretch the band to {findings.stretch:.2f} times its length, within the recorded"
+        f" {findings.recorded_stretch:.2f}.",
+        f"Landings are known to ±{100 * findings.half_width:.0f} cm or better.",
     ]
-    if found.scores:
-        notes.append(inside(found))
-    if not found.unloaded:
+    if findings.scores:
+        notes.append(inside(findings))
+    if not findings.unloaded:
         notes.append(
             "No recording lets the drawn band back, so that softening keeps its prior: launches"
             " tell what it leaves."
         )
-    if found.observed == 1:
+    if findings.observed == 1:
         notes.append("One launch is part of the evidence; one is not many.")
     return notes
 
 
-def _met(found: Findings) -> str:
-    recoil = f", the recoil within {1000 * found.recoil:.1f} mm" if found.recoil_seen else ""
+def _met(findings: Findings) -> str:
+    recoil = f", the recoil within {1000 * findings.recoil:.1f} mm" if findings.recoil_seen else ""
     return (
-        f"the force within {found.force:.2f} N, the band in the hand within"
-        f" {1000 * found.held:.1f} mm{recoil}"
+        f"the force within {findings.force:.2f} N, the band in the hand within"
+        f" {1000 * findings.held:.1f} mm{recoil}"
     )
 
 
 def card_text(
     inputs: CardInputs,
-    found: Findings,
+    findings: Findings,
     verdict: str,
     reasons: list[str],
     shown: list[ShownValue],
@@ -75,7 +75,7 @@ def card_text(
         draws=zip(*draws, strict=True),
         finite=np.isfinite,
         history=inputs.theta.get("history"),
-        found=found,
+        findings=findings,
         met=inputs.confidence.get("recordings"),
         peak=inputs.episode.metadata["preprocessing"]["peak_force"],
         steps=steps,

@@ -46,20 +46,20 @@ def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
     if confidence:  # else nothing was searched but θ
         numbers_of["air_drag"] = theta.get("nuisances", {}).get("air_drag") or 0.0
         numbers_of |= {name: theta[name] for name in EXTRA if name in theta}
-    found = []
+    shown_values = []
     for name, quantity in QUANTITIES.items():
         if name not in numbers_of:
             continue
-        value, known = rounded(quantity.factor * numbers_of[name]), intervals.get(name, {})
+        value, interval = rounded(quantity.factor * numbers_of[name]), intervals.get(name, {})
         still = name in fixed
-        ends = (None if still else known.get(end) for end in ("low", "high"))
+        ends = (None if still else interval.get(end) for end in ("low", "high"))
         low, high = (None if x is None else rounded(quantity.factor * x) for x in ends)
-        prior, identified = known.get("prior"), known.get("identifiable", True)
+        prior, identified = interval.get("prior"), interval.get("identifiable", True)
         if prior:
             prior = rounded(quantity.factor * prior[0]), rounded(quantity.factor * prior[1])
-        about = quantity.label, quantity.unit, value, low, high, still, prior, identified
-        found.append(ShownValue(name, *about))
-    return found
+        cells = quantity.label, quantity.unit, value, low, high, still, prior, identified
+        shown_values.append(ShownValue(name, *cells))
+    return shown_values
 
 
 class SearchedRange(NamedTuple):
@@ -80,11 +80,11 @@ class SearchedRange(NamedTuple):
 def boxes(params: Params, method: str) -> dict[str, SearchedRange]:
     """Of what a method searches, by name."""
     config = params.methods[method]
-    found = {name: SearchedRange(box.low, box.high, box.scale) for name, box in params.parameters}
-    found |= {name: SearchedRange(*ends) for name, ends in config.bounds.items()}
-    found |= {
+    ranges = {name: SearchedRange(box.low, box.high, box.scale) for name, box in params.parameters}
+    ranges |= {name: SearchedRange(*ends) for name, ends in config.bounds.items()}
+    ranges |= {
         "air_drag": SearchedRange(0.0, MOST_DRAG),
         "turn_damping": SearchedRange(0.0, 1.0),
         "returned_share": SearchedRange(np.exp(-MOST_LOST), np.exp(MOST_LOST), "log"),
     }
-    return {name: box for name, box in found.items() if name not in config.fixed}
+    return {name: box for name, box in ranges.items() if name not in config.fixed}

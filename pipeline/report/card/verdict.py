@@ -134,35 +134,37 @@ class Reason:
     cure: str = ""
 
 
-def judge(found: Findings) -> tuple[str, list[Reason]]:
+def judge(findings: Findings) -> tuple[str, list[Reason]]:
     """The verdict and what speaks against, causes before what may follow from them."""
-    recorded = [Reason(False, what, cure) for what, cure in found.cautions]
-    reasons = [*recorded, *_identified(found), *_launches(found), *_tried(found)]
+    recorded = [Reason(False, what, cure) for what, cure in findings.cautions]
+    reasons = [*recorded, *_identified(findings), *_launches(findings), *_tried(findings)]
     if not reasons:
         return TRUSTED, []
     return (NO if any(reason.against for reason in reasons) else CARE), reasons
 
 
-def question(found: Findings) -> str:
+def question(findings: Findings) -> str:
     """What to ask of a band whose mass and size are not those of solid rubber; else ""."""
     low, high = RUBBER
-    if found.density is None or low <= found.density <= high:
+    if findings.density is None or low <= findings.density <= high:
         return ""
     return (
-        f"Is the band hollow? Its mass and size make {found.density:.0f} kg/m³, and solid rubber"
+        f"Is the band hollow? Its mass and size make {findings.density:.0f} kg/m³, and solid rubber"
         f" has {low} to {high}. If it is solid, weigh and measure it again."
     )
 
 
-def inside(found: Findings) -> str:
+def inside(findings: Findings) -> str:
     """How many scored launches landed inside their intervals, and how far off in the mean."""
-    if found.scores == 1:
-        side = "inside" if not found.outside else "outside"
-        return f"The one {found.kind} launch landed {side} its {_LEVEL} interval; one is not many."
-    within = found.scores - found.outside
+    if findings.scores == 1:
+        side = "inside" if not findings.outside else "outside"
+        return (
+            f"The one {findings.kind} launch landed {side} its {_LEVEL} interval; one is not many."
+        )
+    within = findings.scores - findings.outside
     return (
-        f"{within} of {launches_of(found.scores, found.kind)} landed inside their {_LEVEL}"
-        f" intervals, {100 * found.bias:+.1f} % from the prediction in the mean."
+        f"{within} of {launches_of(findings.scores, findings.kind)} landed inside their {_LEVEL}"
+        f" intervals, {100 * findings.bias:+.1f} % from the prediction in the mean."
     )
 
 
@@ -171,35 +173,35 @@ def launches_of(count: int, kind: str = "") -> str:
     return " ".join(filter(None, [str(count), kind, "launch" if count == 1 else "launches"]))
 
 
-def _identified(found: Findings):
-    if found.settled is None:
+def _identified(findings: Findings):
+    if findings.settled is None:
         yield Reason(
             False,
             "This method does not tell how sure its values are.",
             "Put `least_squares` first under `run.methods` in params.yaml: it tells.",
         )
-    elif not found.settled:
+    elif not findings.settled:
         yield Reason(
             False,
             "The fit had not settled when it ended, so values and intervals may still move.",
             "Record a further pull: more evidence makes a fit settle.",
         )
     misfits = (
-        ("force of the pull", found.force, FORCE, "N", 1, "Check the force sensor and its frame,"
+        ("force of the pull", findings.force, FORCE, "N", 1, "Check the force sensor and its frame,"
          " and the band's mass, diameter and rest length under `bands` in params.yaml."),
-        ("band in the hand", found.held, HELD, "mm", 1000, "Check the camera's calibration"
+        ("band in the hand", findings.held, HELD, "mm", 1000, "Check the camera's calibration"
          " and where it stands (`/tf_static`, or `setup.camera_to_fork`)."),
-        ("recoil", found.recoil, RECOIL, "mm", 1000, "Check the camera's clock with `sling check`,"
-         " and record another pull."),
+        ("recoil", findings.recoil, RECOIL, "mm", 1000, "Check the camera's clock with `sling"
+         " check`, and record another pull."),
     )  # fmt: skip
-    if found.carried is not None and not 1 / CARRIED < found.carried < CARRIED:
+    if findings.carried is not None and not 1 / CARRIED < findings.carried < CARRIED:
         yield Reason(
             False,
-            f"Between grasp and pull the band weighed {found.carried:.1f} times on the hand what"
+            f"Between grasp and pull the band weighed {findings.carried:.1f} times on the hand what"
             " one of its mass would.",
             "Weigh the band again, and check the unit and the zero of the force.",
         )
-    missed = [one for one in misfits if one[1] > one[2]]
+    missed = [misfit for misfit in misfits if misfit[1] > misfit[2]]
     for number, (what, size, limit, unit, factor, cure) in enumerate(missed):
         how = "does not meet" if size > NO_FIT * limit else "meets only roughly"
         text = (
@@ -208,22 +210,22 @@ def _identified(found: Findings):
         )
         first = number == 0 and len(missed) > 1
         yield Reason(size > NO_FIT * limit, text, SIZES if first else cure)
-    if not found.recoil_seen:
+    if not findings.recoil_seen:
         yield Reason(
             False,
             "No picture shows the recoil: its damping is only what other rubbers have.",
             "Record another pull with the camera on until a second after the release.",
         )
-    if found.disagreement > DISAGREE:
-        odd = f"; {found.odd} is the one that the others predict worst" if found.odd else ""
+    if findings.disagreement > DISAGREE:
+        odd = f"; {findings.odd} is the one that the others predict worst" if findings.odd else ""
         yield Reason(
             False,
-            f"The recordings disagree {found.disagreement:.1f} times as much as each leaves"
+            f"The recordings disagree {findings.disagreement:.1f} times as much as each leaves"
             f" open{odd}.",
             "Find out what was different in the odd recording (another band, draw, clock or"
             " calibration), and leave it out if it is wrong.",
         )
-    for label, side in found.at_sides:
+    for label, side in findings.at_sides:
         yield Reason(
             False,
             f"The value of {label} is at the {side}; the true one may lie beyond.",
@@ -232,83 +234,87 @@ def _identified(found: Findings):
         )
 
 
-def _launches(found: Findings):
-    for failure in found.failures:
+def _launches(findings: Findings):
+    for failure in findings.failures:
         yield Reason(
             True, failure, "Aim at other targets, or change the box of draws under `setup`."
         )
-    share = found.stretch / found.recorded_stretch
+    share = findings.stretch / findings.recorded_stretch
     if share > FURTHER:
         yield Reason(
             share > MUCH_FURTHER,
-            f"Launches stretch the band to {found.stretch:.2f} times its length, the recording only"
-            f" to {found.recorded_stretch:.2f}: beyond it the simulator guesses.",
-            f"Record a pull that stretches the band to {found.stretch:.2f} times its length.",
+            f"Launches stretch the band to {findings.stretch:.2f} times its length, the recording"
+            f" only to {findings.recorded_stretch:.2f}: beyond it the simulator guesses.",
+            f"Record a pull that stretches the band to {findings.stretch:.2f} times its length.",
         )
-    if NEAR_LIMIT < found.hold_force / found.max_force <= 1:  # beyond, the launch fails
+    if NEAR_LIMIT < findings.hold_force / findings.max_force <= 1:  # beyond, the launch fails
         yield Reason(
             False,
-            f"Holding a draw takes {found.hold_force:.1f} N, and the arm may hold"
-            f" {found.max_force:g} N.",
+            f"Holding a draw takes {findings.hold_force:.1f} N, and the arm may hold"
+            f" {findings.max_force:g} N.",
             "Aim at nearer targets, or raise `setup.max_force` if the arm can hold more.",
         )
-    if found.miss > MISSES:
+    if findings.miss > MISSES:
         yield Reason(
             True,
-            f"The policy misses a target by {100 * found.miss:.0f} cm in its own simulator.",
+            f"The policy misses a target by {100 * findings.miss:.0f} cm in its own simulator.",
             "Widen the box of draws (`setup.draw_y`, `setup.draw_z`), or aim at other targets.",
         )
-    elif not found.converged:
+    elif not findings.converged:
         yield Reason(
             False,
             "The policy's training did not converge.",
             "Train it longer (`policy.iterations`), or widen the box of draws.",
         )
-    if found.half_width != found.half_width and not found.failures:
+    if findings.half_width != findings.half_width and not findings.failures:
         yield Reason(False, "How wide the landings scatter is not known.")
-    elif found.half_width > WIDE:
+    elif findings.half_width > WIDE:
         yield Reason(
-            found.half_width > HALF_AREA,
-            f"Landings are known to ±{100 * found.half_width:.0f} cm only.",
+            findings.half_width > HALF_AREA,
+            f"Landings are known to ±{100 * findings.half_width:.0f} cm only.",
         )
 
 
-def _tried(found: Findings):
-    if not (found.scores or found.observed):
+def _tried(findings: Findings):
+    if not (findings.scores or findings.observed):
         yield Reason(
             False,
-            f"No launch was measured{'.' if found.unloaded else f', and {UNSEEN}'}",
+            f"No launch was measured{'.' if findings.unloaded else f', and {UNSEEN}'}",
         )
-    if found.scores:
-        unlucky = binom.sf(found.outside - 1, found.scores, 1 - LEVEL) < UNLUCKY
-        if unlucky or (found.outside and found.off > WIDE):  # few launches are soon luck
+    if findings.scores:
+        unlucky = binom.sf(findings.outside - 1, findings.scores, 1 - LEVEL) < UNLUCKY
+        if unlucky or (findings.outside and findings.off > WIDE):  # few launches are soon luck
             yield Reason(
-                found.off > (WIDE if unlucky else HALF_AREA),
-                f"{found.outside} of {launches_of(found.scores, found.kind)} landed outside the"
-                f" {_LEVEL} interval, {100 * found.off:.0f} cm off"
-                f"{' in the mean' * (found.scores > 1)}.",
+                findings.off > (WIDE if unlucky else HALF_AREA),
+                f"{findings.outside} of {launches_of(findings.scores, findings.kind)} landed"
+                f" outside the {_LEVEL} interval, {100 * findings.off:.0f} cm off"
+                f"{' in the mean' * (findings.scores > 1)}.",
                 "Tell the simulator of a launch with `sling observe`.",
             )
-    if found.biased:
-        side = "short" if found.bias < 0 else "long"
+    if findings.biased:
+        side = "short" if findings.bias < 0 else "long"
         yield Reason(
             False,
-            f"The {found.scores} {found.kind} launches landed {abs(100 * found.bias):.1f} % {side}"
-            " in the mean, more than chance explains: they share a cause.",
+            f"The {findings.scores} {findings.kind} launches landed"
+            f" {abs(100 * findings.bias):.1f} % {side} in the mean, more than chance explains: they"
+            " share a cause.",
             "Tell the simulator of one launch with `sling observe`: it takes out what all share.",
         )
-    if found.surprising and binom.sf(found.surprising - 1, found.observed, 1 - LEVEL) < UNCONFIRMED:
+    if (
+        findings.surprising
+        and binom.sf(findings.surprising - 1, findings.observed, 1 - LEVEL) < UNCONFIRMED
+    ):
         yield Reason(
             False,
-            f"{found.surprising} of {launches_of(found.observed)} used as"
+            f"{findings.surprising} of {launches_of(findings.observed)} used as"
             f" evidence landed outside the {_LEVEL} interval that everything else gives.",
             "Measure that launch again, and another one at the same draw: a wrong draw or landing"
             " shifts all predictions.",
         )
-    if found.left > ODD_LAUNCH:
+    if findings.left > ODD_LAUNCH:
         yield Reason(
-            found.left > FAR_LAUNCH,
-            f"A launch that is evidence is {100 * found.left:.0f} % off what all evidence together"
-            " says.",
+            findings.left > FAR_LAUNCH,
+            f"A launch that is evidence is {100 * findings.left:.0f} % off what all evidence"
+            " together says.",
             "Measure that launch again: its draw or its landing may be wrong.",
         )

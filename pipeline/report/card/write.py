@@ -27,25 +27,27 @@ from pipeline.report.card.verdict import judge, question
 def write(params: Params, band: str, method: str, root: str | Path = ".") -> dict:
     """Write a band's card; return what card.json says. Raises UserError: an input is missing."""
     inputs = card_inputs(params, band, method, root)
-    episode, setup, about = inputs.episode, params.setup, params.methods[method]
+    episode, setup, method_params = inputs.episode, params.setup, params.methods[method]
     layout = Layout(Path(root))
     recording = layout.raw(band) / episode.metadata["input"]["file"]
     pictures = Pictures.of(recording, episode, setup)
     simulated = simulate(params, band, method, episode, inputs.theta)
 
-    found = findings(inputs, simulated.force)
-    verdict, against = judge(found)
-    reasons, shown = reasons_of(found, against), values(inputs.theta, about.fixed)
+    card_findings = findings(inputs, simulated.force)
+    verdict, against = judge(card_findings)
+    reasons, shown = reasons_of(card_findings, against), values(inputs.theta, method_params.fixed)
     aims = inputs.aims
     model, samples = None, inputs.samples
     if samples is not None:
         landings = aims.samples, aims.slope, aims.half_width
         model = LandingModel.of(samples.names, samples.values, *landings)
     launches = len(inputs.confidence.get("launches", []))
-    evidence = inputs.episodes, launches, question(found)
-    steps = next_steps(band, against, model, aims.target, *evidence, unloaded=found.unloaded)
+    evidence = inputs.episodes, launches, question(card_findings)
+    steps = next_steps(
+        band, against, model, aims.target, *evidence, unloaded=card_findings.unloaded
+    )
     card = content(inputs, verdict, reasons, shown, steps)
-    text = inputs, found, verdict, reasons, shown, steps
+    text = inputs, card_findings, verdict, reasons, shown, steps
 
     with replacing_folder(layout.card(band)) as folder:
         figures.camera(folder / "camera.webp", episode, simulated, pictures)
@@ -83,7 +85,7 @@ def content(inputs: CardInputs, verdict: str, reasons: list, shown: list, steps:
         "method": inputs.method,
         "verdict": verdict,
         "reasons": reasons,
-        "values": [asdict(one) for one in shown],
+        "values": [asdict(value) for value in shown],
         "draws": draws,
         "next": steps,
         "theta_file": Layout().theta(inputs.band, inputs.method).as_posix(),

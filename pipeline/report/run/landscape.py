@@ -49,7 +49,7 @@ def landscape(params: Params, result: Result, episode: Episode) -> Landscape:
 def _span(result: Result, name: str) -> np.ndarray:
     refined = result.history.loc[result.history.phase == "cma", f"unit_{name}"]
     axis = result.axes.index(name)
-    centres = [one.mu[axis] for one in result.regions]
+    centres = [region.mu[axis] for region in result.regions]
     low, high = np.quantile(refined, [0.02, 0.98])
     low, high = min([low, *centres]) - AROUND, max([high, *centres]) + AROUND
     return np.linspace(max(low, 0), min(high, 1), SIZE)

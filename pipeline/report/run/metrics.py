@@ -32,15 +32,15 @@ def summary(results: Results, main: str, theirs: str | None) -> dict[str, float]
         the error of the paper's method; over launches of the main method: `failed`, `bias_%` of
         its predictions, `in_90_%` of its intervals, and their median `width_%` of the distance.
     """
-    found: dict[str, float | None] = {}
+    metrics: dict[str, float | None] = {}
     ratios, beside = [], []
     for band, methods in results.methods.items():
         error = _error(methods[main])
         if error is None:
             modulus = methods[main].theta["theta"]["youngs_modulus"]
-            found[f"{band}_{YOUNG.unit}"] = YOUNG.factor * modulus
+            metrics[f"{band}_{YOUNG.unit}"] = YOUNG.factor * modulus
             continue
-        found[f"{band}_cm"] = 100 * error
+        metrics[f"{band}_cm"] = 100 * error
         if band in results.least:
             ratios.append(error / results.least[band])
         if theirs is not None:
@@ -48,19 +48,19 @@ def summary(results: Results, main: str, theirs: str | None) -> dict[str, float]
     some = [methods[main].trials for methods in results.methods.values()]
     trials = pd.concat(some, ignore_index=True)
     trials = of_kind(trials, *LAUNCHED)
-    found["floors"] = _mean(ratios)
-    found["paper_cm"] = _mean([100 * one for one in beside if one is not None])
+    metrics["floors"] = _mean(ratios)
+    metrics["paper_cm"] = _mean([100 * error_m for error_m in beside if error_m is not None])
     if len(trials):
         aimed = landing_errors(trials)["all"]
-        found["failed"] = aimed.failed if aimed.launches else None
-        found["bias_%"] = 100 * prediction_error(trials)["all"].bias
+        metrics["failed"] = aimed.failed if aimed.launches else None
+        metrics["bias_%"] = 100 * prediction_error(trials)["all"].bias
         coverage = (intervals(trials) or {}).get("all")
         if coverage and coverage.launches:
-            found["in_90_%"] = 100 * coverage.covered / coverage.launches
-            found["width_%"] = 100 * coverage.width
+            metrics["in_90_%"] = 100 * coverage.covered / coverage.launches
+            metrics["width_%"] = 100 * coverage.width
     return {
         name: value if isinstance(value, int) else float(f"{value:.{DIGITS}g}")
-        for name, value in found.items()
+        for name, value in metrics.items()
         if value is not None and np.isfinite(value)
     }
 

@@ -95,13 +95,16 @@ def _freedom(change: list[tuple]) -> float:
     """Of Student's t, by Welch and Satterthwaite: targets may spread differently."""
     some = [part for parts in change for part in parts if len(part) > 1]
     shares = np.array([part.var(ddof=1) / len(part) for part in some])
-    own = sum(share**2 / (len(part) - 1) for share, part in zip(shares, some, strict=True))
-    return shares.sum() ** 2 / own if own else 1.0
+    degrees = sum(share**2 / (len(part) - 1) for share, part in zip(shares, some, strict=True))
+    return shares.sum() ** 2 / degrees if degrees else 1.0
 
 
 def _misses(trials: pd.DataFrame) -> list[np.ndarray]:
     """|y - g| [m] of each target's launches, in the order of the targets."""
-    return [(one.landing_y - target).abs().to_numpy() for target, one in trials.groupby("target")]
+    return [
+        (of_target.landing_y - target).abs().to_numpy()
+        for target, of_target in trials.groupby("target")
+    ]
 
 
 def _resampled(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -73,8 +73,8 @@ class Repeated:
             content = json.loads(path.read_text(encoding="utf-8"))
             figures, paper = content["figures"], "less_sling2sim2real"
             return cls(
-                {band: _intervals(one["methods"]) for band, one in figures.items()},
-                {band: _differences(one[paper]) for band, one in figures.items()},
+                {band: _intervals(figure["methods"]) for band, figure in figures.items()},
+                {band: _differences(figure[paper]) for band, figure in figures.items()},
                 _interval(content["rank_correlation_of_loss_and_miss"]["over_recordings"]),
                 _settings(content["settings"]),
             )
@@ -112,16 +112,20 @@ def _settings(settings: dict) -> dict[str, Any]:
 
 def _intervals(methods: dict) -> dict[str, MeanInterval]:
     """Of the methods that have a mean."""
-    return {name: _interval(one["miss_cm"]) for name, one in methods.items() if one["miss_cm"]["n"]}
+    return {
+        name: _interval(of_method["miss_cm"])
+        for name, of_method in methods.items()
+        if of_method["miss_cm"]["n"]
+    }
 
 
-def _interval(one: dict) -> MeanInterval:
-    return MeanInterval(*(one[key] for key in ("mean", "low", "high", "n")))
+def _interval(content: dict) -> MeanInterval:
+    return MeanInterval(*(content[key] for key in ("mean", "low", "high", "n")))
 
 
 def _differences(methods: dict) -> dict[str, Against]:
     return {
-        name: Against(*(one[key] for key in ("mean", "low", "high", "p_holm")))
-        for name, one in methods.items()
-        if one["n"]
+        name: Against(*(content[key] for key in ("mean", "low", "high", "p_holm")))
+        for name, content in methods.items()
+        if content["n"]
     }

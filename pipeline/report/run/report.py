@@ -45,8 +45,11 @@ class Report:
         named = styles(dict.fromkeys(result.method for result in results))
         replays = {band: _replays(params, results, band) for band in params.run.bands}
         repeated = Repeated.load(root) if results.floors else None
-        one = next((one for one in results if one.regions), None)
-        chart = one and (one, landscape(params, one, results.episodes[one.band]))
+        searched = next((result for result in results if result.regions), None)
+        chart = searched and (
+            searched,
+            landscape(params, searched, results.episodes[searched.band]),
+        )
         return cls(params, results, replays, named, chart, repeated, root)
 
     @property

@@ -98,12 +98,12 @@ class Results:
     @property
     def least(self) -> dict[str, float]:
         """Mean error of the actuation floor by band [m], where the oracle's launches land."""
-        means = {band: one["mean_error_m"] for band, one in self.floors.items()}
+        means = {band: floor["mean_error_m"] for band, floor in self.floors.items()}
         return {band: mean for band, mean in means.items() if mean}
 
     @property
     def trials(self) -> pd.DataFrame:
-        return pd.concat([one.trials for one in self], ignore_index=True)
+        return pd.concat([result.trials for result in self], ignore_index=True)
 
     def __iter__(self):
         """Every result, band by band."""
@@ -124,7 +124,7 @@ def gather(params: Params, root: str | Path = ".") -> Results:
     unused = {band: _unused(layout, band, methods[band]) for band in methods}
     dips = {
         name: InformativePull(
-            next((one for one in params.run.bands if name.startswith(f"{one}_")), name),
+            next((listed for listed in params.run.bands if name.startswith(f"{listed}_")), name),
             pd.read_parquet(made(layout.trials(name, params.run.methods[0]))),
         )
         for name in params.run.dips
@@ -134,16 +134,16 @@ def gather(params: Params, root: str | Path = ".") -> Results:
 
 def _unused(layout: Layout, band: str, methods: Collection[str]) -> int:
     """How many measured launches name a method that does not run on the band."""
-    return sum(one.method not in ("", *methods) for one in load_scores(layout.scores(band)))
+    return sum(score.method not in ("", *methods) for score in load_scores(layout.scores(band)))
 
 
 def _result(params: Params, layout: Layout, band: str, method: str) -> Result:
     history = pd.read_parquet(made(layout.evaluations(band, method)))
-    found = layout.clusters(band, method)
+    clusters = layout.clusters(band, method)
     clustered = params.methods[method].search == "multistart"
-    regions, axes = load_regions(found) if clustered else ([], [])
+    regions, axes = load_regions(clusters) if clustered else ([], [])
     if missing := [name for name in axes if f"unit_{name}" not in history]:
-        raise NotMade(found, f"names: {missing[0]} was not searched")
+        raise NotMade(clusters, f"names: {missing[0]} was not searched")
     theta = load_theta(layout.theta(band, method), band)
     stored, policy = Stored(band, method, layout.root), layout.policy(band, method)
     return Result(

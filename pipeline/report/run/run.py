@@ -20,7 +20,7 @@ PACKAGES = ("numpy", "scipy", "warp-lang", "cma", "torch", "rsl-rl-lib", "pyarro
 
 def write_run(folder: Path, **more: object) -> dict:
     """Write run.js into `folder`, with `more` beside what this machine is; return what it says."""
-    about = {
+    description = {
         "written": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
         "commit": commit(folder) or "unknown",
         "machine": f"{processor()}, {cores()} cores",
@@ -29,5 +29,5 @@ def write_run(folder: Path, **more: object) -> dict:
         "python": platform.python_version(),
         **{name: version(name) for name in PACKAGES},
     }
-    write_text(folder / "run.js", f"run = {json.dumps(about, indent=2)}\n")
-    return about
+    write_text(folder / "run.js", f"run = {json.dumps(description, indent=2)}\n")
+    return description

@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.identify.posterior import fit as module
 from pipeline.identify.posterior.fit import BINNED, NoFit, fit
-from pipeline.identify.posterior.identify import disagreement, samples_around, without
+from pipeline.identify.posterior.identify import birge_ratio, leave_one_out, samples_around
 from tests.identify.posterior.toy import SIZE, Curve, curve, least, space
 
 TRUE = np.array([8.0, 9.0, 3.0]) * SIZE
@@ -156,7 +156,7 @@ def test_without_a_recording_is_a_fit_without_it():
     seen, box = curves(3), space()
     found, refit = fit(seen, box, START), fit(seen[1:], box, START)
     spread = np.sqrt(np.diag(np.linalg.inv(refit.hessian)))
-    summary = without(SimpleNamespace(fit=found, coordinates=box), 0)
+    summary = leave_one_out(SimpleNamespace(fit=found, coordinates=box), 0)
     moved = np.array(list(summary["moved"].values()))
     np.testing.assert_allclose(moved, (refit.phi - found.phi) / spread, atol=0.1)
     there = seen[0].expand(None, refit.phi, None, None, None).misfit
@@ -165,12 +165,12 @@ def test_without_a_recording_is_a_fit_without_it():
 
 def test_disagreement_is_one_of_alike_recordings_and_grows_with_a_shift():
     alike = [Curve(curve(TRUE)) for _ in range(3)]
-    assert disagreement(fit(alike, space(), START)) == 1.0
-    assert disagreement(fit(alike[:1], space(), START)) == 1.0
+    assert birge_ratio(fit(alike, space(), START)) == 1.0
+    assert birge_ratio(fit(alike[:1], space(), START)) == 1.0
     ratios = []
     for shift in (0.2, 0.4):
         other = [*alike[:2], Curve(curve(TRUE + shift * SIZE))]
-        ratios.append(disagreement(fit(other, space(), START)))
+        ratios.append(birge_ratio(fit(other, space(), START)))
     assert ratios[0] > 1.5 and ratios[1] == pytest.approx(2 * ratios[0], rel=0.1)
 
 
@@ -185,5 +185,5 @@ def test_disagreement_of_mere_noise_is_one_on_average():
             total += expansion.gradient @ inverse @ expansion.gradient
             freedom += 3 * (1 - 1 / 3)
         squares.append(total / freedom)
-        assert disagreement(first) == pytest.approx(max(np.sqrt(squares[-1]), 1.0), rel=0.25)
+        assert birge_ratio(first) == pytest.approx(max(np.sqrt(squares[-1]), 1.0), rel=0.25)
     assert np.mean(squares) == pytest.approx(1.0, abs=0.15)

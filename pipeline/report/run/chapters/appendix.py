@@ -77,7 +77,7 @@ def _predictions(report: Report) -> str | None:
     results = report.results
     if results.trials.landing_y.isna().all():
         return None
-    trusted = {(one.band, one.method) for one in results if one.confidence}
+    trusted = {(result.band, result.method) for result in results if result.confidence}
     drawing = of_kind(results.trials, *LAUNCHED), trusted, report.shown(report.params.run.methods)
     alt = "predicted beside actual landings"
     return report.picture("predictions", alt, landings.predictions, *drawing)
@@ -87,8 +87,8 @@ def _convergence(report: Report) -> str | None:
     """Of the methods that minimise one loss, and of the main one; where a band has several."""
     searches = {
         band: {
-            method: one
-            for method, one in methods.items()
+            method: result
+            for method, result in methods.items()
             if method == report.main
             or not has_another_loss(dict(report.params.methods[method].weights))
         }
@@ -102,14 +102,14 @@ def _convergence(report: Report) -> str | None:
 
 def _corner(report: Report) -> dict[str, str] | None:
     """Of the first search that refines regions, where one did."""
-    one = next((one for one in report.results if one.regions), None)
-    if one is None:
+    result = next((searched for searched in report.results if searched.regions), None)
+    if result is None:
         return None
-    name = report.styles[one.method].name
-    alt = f"every θ that {name} evaluated for {one.band}"
-    drawing = search.corner, one, report.params.parameters, name
+    name = report.styles[result.method].name
+    alt = f"every θ that {name} evaluated for {result.band}"
+    drawing = search.corner, result, report.params.parameters, name
     picture = report.picture("corner", alt, *drawing)
-    return {"method": name, "band": one.band, "picture": picture}
+    return {"method": name, "band": result.band, "picture": picture}
 
 
 def _correlation(report: Report) -> str | None:
@@ -141,10 +141,10 @@ def _maps(report: Report) -> str:
         "maps",
         "landing against draw",
         policy.landing_maps,
-        {band: one.landing_map for band, one in main.items()},
-        {band: report.draws(one, path) for band, one in main.items()},
+        {band: result.landing_map for band, result in main.items()},
+        {band: report.draws(result, path) for band, result in main.items()},
         np.array(params.trials.targets),
-        {band: float(one.trials.recorded_stretch.max()) for band, one in main.items()},
+        {band: float(result.trials.recorded_stretch.max()) for band, result in main.items()},
         params.setup.fork_width,
         {band: params.bands[band].rest_length for band in main},
     )

@@ -59,16 +59,16 @@ def _search(report: Report) -> tuple[str, str] | None:
     """By which method, and its picture."""
     if report.landscape is None:
         return None
-    one, chart = report.landscape
-    drawing = method, one, chart, report.params.parameters
+    result, chart = report.landscape
+    drawing = method, result, chart, report.params.parameters
     alt = "exploration, regions, CMA-ES"
-    return report.styles[one.method].name, report.picture("method", alt, *drawing)
+    return report.styles[result.method].name, report.picture("method", alt, *drawing)
 
 
 def _flights(report: Report, shown: Styles) -> tuple[str, str] | None:
     """On the first band whose flights are known, and their picture."""
     for band, methods in report.results.methods.items():
-        trials = pd.concat([one.trials for one in methods.values()], ignore_index=True)
+        trials = pd.concat([result.trials for result in methods.values()], ignore_index=True)
         flew = set(trials.loc[trials.flight_y.notna()].method)
         if flown := {method: style for method, style in shown.items() if method in flew}:
             drawing = flights, of_kind(trials, "virtual"), report.params.setup, flown

@@ -43,7 +43,7 @@ def findings(report: Report) -> list[str]:
     results, references = report.results, report.references
     sentences, some = [], list(results)
     for kind in LAUNCHED:
-        if any((one.trials.kind == kind).any() for one in some):
+        if any((result.trials.kind == kind).any() for result in some):
             sentences += [*_errors(report, kind), *_predictions(report, kind)]
     rows = compared(results, references, report.params.trials.seed)
     if len(references) > 1:
@@ -53,8 +53,8 @@ def findings(report: Report) -> list[str]:
         for claim, methods in CLAIMS.items()
         if paper.METHOD in references and (sentence := _claim(report, rows, claim, methods))
     ]
-    own = OWN * (repeated.OURS in references and bool(results.floors))
-    caveat = [f"{CAVEAT}{own}."] if rows else []
+    caution = OWN * (repeated.OURS in references and bool(results.floors))
+    caveat = [f"{CAVEAT}{caution}."] if rows else []
     if report.repeated and paper.METHOD in references:
         return [*sentences, *caveat, *repeated.claims(report.repeated, report.params)]
     return [*sentences, *claims, *caveat]
@@ -72,8 +72,8 @@ def _errors(report: Report, kind: str) -> list[str]:
         if not means:
             continue
         text = f"**{report.styles[method].name}** {_between([100 * m for m in means.values()])} cm"
-        known = report.results.least if kind == "virtual" else {}
-        floors = [means[band] / known[band] for band in means if band in known]
+        floor_of = report.results.least if kind == "virtual" else {}
+        floors = [means[band] / floor_of[band] for band in means if band in floor_of]
         if floors and method == report.main:
             text += f" ({_between(floors)} times the actuation floor)"
         words.append(text)
@@ -87,16 +87,16 @@ def _predictions(report: Report, kind: str) -> list[str]:
     errors, biases, held, count, widths, off = [], [], 0, 0, [], []
     for methods in report.results.methods.values():
         trials = of_kind(methods[report.main].trials, kind)
-        about = prediction_error(trials)["all"]
-        if not about.launches:
+        error = prediction_error(trials)["all"]
+        if not error.launches:
             continue
-        errors.append(100 * about.mean)
-        biases.append(100 * about.bias)
+        errors.append(100 * error.mean)
+        biases.append(100 * error.bias)
         ranges = intervals(trials) if methods[report.main].confidence else None
         if ranges and ranges["all"].launches:
             held, count = held + ranges["all"].covered, count + ranges["all"].launches
             widths.append(100 * ranges["all"].width)
-            off.append(about.mean)
+            off.append(error.mean)
     if not errors:
         return []
     name = report.styles[report.main].name
@@ -117,13 +117,13 @@ def _predictions(report: Report, kind: str) -> list[str]:
 
 def _beside(report: Report, rows: list[Compared]) -> list[str]:
     """The main method beside the paper's."""
-    found: dict[str, list[Compared]] = {}
+    by_verdict: dict[str, list[Compared]] = {}
     for row in rows:
-        if paper.METHOD in row.found:
-            found.setdefault(_verdict(report, row), []).append(row)
+        if paper.METHOD in row.beside:
+            by_verdict.setdefault(_verdict(report, row), []).append(row)
     words = []
     for verdict, phrase in ((BETTER, "nearer on"), (WORSE, "further off on"), (SAME, SAME)):
-        if some := found.get(verdict):
+        if some := by_verdict.get(verdict):
             where = f"{phrase} {_list(row.band for row in some)}"
             words.append(where + ("" if verdict == SAME else _by(some, " by")))
     if not words:
@@ -136,7 +136,7 @@ def _claim(report: Report, rows: list[Compared], claim: str, methods: tuple[str,
     """Whether a finding of the paper's holds in this run; empty where nothing was tried."""
     tried: dict[str, list[Compared]] = {}
     for row in rows:
-        if row.method in methods and row.method != paper.METHOD and paper.METHOD in row.found:
+        if row.method in methods and row.method != paper.METHOD and paper.METHOD in row.beside:
             tried.setdefault(_verdict(report, row), []).append(row)
     bands = {row.band for some in tried.values() for row in some}
     several = len(bands) > 1
@@ -165,8 +165,8 @@ def _claim(report: Report, rows: list[Compared], claim: str, methods: tuple[str,
 
 def _by(rows: list[Compared], words: str) -> str:
     """As in " by 2.9 to 4.4 cm"; empty where no launches can be compared."""
-    known = [row.found[paper.METHOD] for row in rows]
-    sizes = [100 * abs(one.mean) for one in known if one is not None]
+    differences = [row.beside[paper.METHOD] for row in rows]
+    sizes = [100 * abs(difference.mean) for difference in differences if difference is not None]
     return f"{words} {_between(sizes)} cm" if sizes else ""
 
 
@@ -179,38 +179,38 @@ def _verdict(report: Report, row: Compared) -> str:
         lost.append(errors.failed == errors.launches)
     if lost[0] != lost[1]:
         return WORSE if lost[0] else BETTER
-    one = row.found[paper.METHOD]
-    if one is None or not one.real:
+    difference = row.beside[paper.METHOD]
+    if difference is None or not difference.real:
         return SAME
-    return WORSE if one.mean > 0 else BETTER
+    return WORSE if difference.mean > 0 else BETTER
 
 
 def doubts(report: Report) -> list[str]:
     """What did not go well, a sentence each."""
     sentences = []
-    for one in report.results:
-        name = f"{one.band}, {report.styles[one.method].name}"
-        sentences += [f"⚠ {name}: {words}" for words in _wrong(one)]
+    for result in report.results:
+        name = f"{result.band}, {report.styles[result.method].name}"
+        sentences += [f"⚠ {name}: {words}" for words in _wrong(result)]
     return sentences + [
         f"⚠ {band}: {count} measured launches name a method that does not run on this band."
         for band, count in report.results.unused.items()
     ]
 
 
-def _wrong(one: Result) -> list[str]:
-    sentences, unpredicted = [], int(one.trials.predicted_y.isna().sum())
+def _wrong(result: Result) -> list[str]:
+    sentences, unpredicted = [], int(result.trials.predicted_y.isna().sum())
     if unpredicted:
-        sentences.append(f"{unpredicted} of {len(one.trials)} launches could not be predicted.")
-    if not one.card["training"]["converged"]:
+        sentences.append(f"{unpredicted} of {len(result.trials)} launches could not be predicted.")
+    if not result.card["training"]["converged"]:
         sentences.append("the policy did **not** converge in its own simulator.")
-    if not one.confidence:
+    if not result.confidence:
         return sentences
-    if not one.confidence.get("settled", True):
-        steps = one.confidence.get("steps", "all its")
+    if not result.confidence.get("settled", True):
+        steps = result.confidence.get("steps", "all its")
         sentences.append(
             f"the fit had **not settled** after {steps} steps; do not rely on its intervals."
         )
-    if not any(recording["pictures"] for recording in one.confidence["recordings"]):
+    if not any(recording["pictures"] for recording in result.confidence["recordings"]):
         sentences.append(
             "no camera frame shows the recoil, so the damping is what other rubbers have; a launch"
             " would say most."

@@ -30,8 +30,8 @@ OVER = ("landing error [cm], g in cm", 4)  # above tables 1, 3 and 4, from that 
 def paper_tables(report: Report) -> str:
     """The chapter; writes table1.csv, table1.tex, ..., those that have rows."""
     params, results, named = report.params, report.results, report.styles
-    found = parameters.identified(results, params)
-    tables = {2: (parameters.as_table(found, named), parameters.records(found))}
+    identified = parameters.identified(results, params)
+    tables = {2: (parameters.as_table(identified, named), parameters.records(identified))}
     for count, rows in (
         (1, benchmark.benchmark(results)),
         (3, benchmark.ablation(results, paper.OPTIMISERS)),
@@ -58,13 +58,15 @@ def paper_tables(report: Report) -> str:
         level=LEVEL,
         changed=repeated and _listed(repeated.changed_settings(params)),
         trusted=any(result.confidence for result in results),
-        edges=any(value.at_edge for row in found for value in row.values.values()),
+        edges=any(value.at_edge for row in identified for value in row.values.values()),
     )
 
 
 def _listed(changed: list[Change]) -> str:
     """Settings of the campaign, and those of this run."""
-    return "; ".join(str(one).replace(" was ", " ").replace(", is ", ", here ") for one in changed)
+    return "; ".join(
+        str(change).replace(" was ", " ").replace(", is ", ", here ") for change in changed
+    )
 
 
 def write_csv(path: Path, records: pd.DataFrame) -> None:

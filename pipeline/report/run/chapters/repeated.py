@@ -19,15 +19,15 @@ CLAIMS = {  # of the paper, by the number of the table that shows it
 def claims(repeated: Repeated, params: Params) -> list[str]:
     """Ours beside the paper's method, then each finding of the paper's."""
     misses = repeated.miss[ALL]
-    known = [f"**{name_of(m)}** {_mean(misses[m])}" for m in (OURS, paper.METHOD) if m in misses]
-    count = max(one.count for one in misses.values())
+    means = [f"**{name_of(m)}** {_mean(misses[m])}" for m in (OURS, paper.METHOD) if m in misses]
+    count = max(misse.count for misse in misses.values())
     sentences = [
         f"On {count} further recordings of the rig's bands,"
         f" which took part in no choice though their bands did"
         f" ([table 1](#table-1), [data](validation/{FILE.name})),"
-        f" launches without errors miss by {', '.join(known)}."]  # fmt: skip
+        f" launches without errors miss by {', '.join(means)}."]  # fmt: skip
     if changed := repeated.changed_settings(params):
-        keys = ", ".join(one.key for one in changed)
+        keys = ", ".join(change.key for change in changed)
         sentences.append(
             f"These recordings were searched with other settings than this run: {keys}."
         )
@@ -38,13 +38,13 @@ def claims(repeated: Repeated, params: Params) -> list[str]:
 def _why(ranks: MeanInterval) -> list[str]:
     """What a lower loss of the paper's is worth; nothing where the interval leaves it open."""
     words = f"{ranks.mean:+.2f}, {ranks.low:+.2f} to {ranks.high:+.2f}".replace("-", "−")
-    about = f"(rank correlation on one recording: {words})"
+    correlation = f"(rank correlation on one recording: {words})"
     if ranks.low > 0:
-        return [f"A search that finds a lower loss of the paper's lands nearer {about}."]
+        return [f"A search that finds a lower loss of the paper's lands nearer {correlation}."]
     if ranks.high < FEW:
         return [
-            f"A search that finds a lower loss of the paper's does not land nearer {about}: its"
-            " minimum lies off the rig's band, so searching better does not help."
+            f"A search that finds a lower loss of the paper's does not land nearer {correlation}:"
+            " its minimum lies off the rig's band, so searching better does not help."
         ]
     return []
 
@@ -52,20 +52,20 @@ def _why(ranks: MeanInterval) -> list[str]:
 def _claim(repeated: Repeated, table: int, claim: str) -> str:
     """A finding against every method of its table but ours and those that no one compares."""
     others = [m for m in ROWS[table] if m not in (OURS, paper.METHOD, "no_clamp_calibration")]
-    found: dict[str, list[str]] = {}
+    by_verdict: dict[str, list[str]] = {}
     for method in others:
-        one = repeated.against[ALL].get(method)
-        if one is None:
+        difference = repeated.against[ALL].get(method)
+        if difference is None:
             continue
         name = name_of(method).replace(", ", " with ") if method not in PLAIN else name_of(method)
-        words = f"{name} ({one.mean:+.1f} cm)".replace("-", "−")
+        words = f"{name} ({difference.mean:+.1f} cm)".replace("-", "−")
         verdict = "is open against"
-        if one.real:
-            verdict = "holds against" if one.mean > 0 else "does not hold against"
-        found.setdefault(verdict, []).append(words)
-    parts = [f"{verdict} {'; '.join(names)}" for verdict, names in sorted(found.items())]
+        if difference.real:
+            verdict = "holds against" if difference.mean > 0 else "does not hold against"
+        by_verdict.setdefault(verdict, []).append(words)
+    parts = [f"{verdict} {'; '.join(names)}" for verdict, names in sorted(by_verdict.items())]
     return f"There, the paper's finding that {claim} {', and '.join(parts)}."
 
 
-def _mean(one: MeanInterval) -> str:
-    return f"{one.mean:.1f} cm ({one.low:.1f} to {one.high:.1f})"
+def _mean(interval: MeanInterval) -> str:
+    return f"{interval.mean:.1f} cm ({interval.low:.1f} to {interval.high:.1f})"

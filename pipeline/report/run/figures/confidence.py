@@ -21,13 +21,13 @@ def correlation(confidences: dict[str, dict]) -> Figure:
         confidences: What the θ file of each band says of its confidence.
     """
     title = "Red or blue: the recording tells the two together better than each alone"
-    figure, found = panels(confidences, title, 3.4, columns=1)
+    figure, axes = panels(confidences, title, 3.4, columns=1)
     norm = Normalize(-1, 1)
     shades = ScalarMappable(norm, "RdBu_r")
-    for band, ax in found.items():
-        about = confidences[band]["correlation"]
-        matrix = np.array(about["matrix"], float)
-        names = [coordinate(name) for name in about["names"]]
+    for band, ax in axes.items():
+        correlations = confidences[band]["correlation"]
+        matrix = np.array(correlations["matrix"], float)
+        names = [coordinate(name) for name in correlations["names"]]
         ax.imshow(matrix, cmap=shades.cmap, norm=norm)
         for (row, column), value in np.ndenumerate(matrix):
             if column < row and abs(value) >= 0.05:
@@ -38,5 +38,5 @@ def correlation(confidences: dict[str, dict]) -> Figure:
         ax.set_yticks(range(len(names)), names)
         ax.tick_params(length=0, labelsize=7)
         ax.spines[:].set_visible(False)
-    figure.colorbar(shades, ax=list(found.values()), label="correlation", shrink=0.8)
+    figure.colorbar(shades, ax=list(axes.values()), label="correlation", shrink=0.8)
     return figure

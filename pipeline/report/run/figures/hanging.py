@@ -45,9 +45,9 @@ def hanging(rows: list[Hanging], styles: Styles) -> Figure:
     ax.set_ylim(1.14 * np.nanmax([100 * row.lengths[FOLDED] for row in rows]), 0)
     shown = dict.fromkeys(row.method for row in rows)
     entries = [
-        ("the rig's rubber" if one is None else styles[one].name,
-         mark(color=INK if one is None else styles[one].color, lw=3))
-        for one in shown
+        ("the rig's rubber" if method is None else styles[method].name,
+         mark(color=INK if method is None else styles[method].color, lw=3))
+        for method in shown
     ]  # fmt: skip
     entries += [("without the weight", mark(color="0.8", lw=1.2))]
     entries += [("recorded stretch", mark(color="0.5", lw=0.8, ls=":"))]

@@ -36,8 +36,8 @@ def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> Fi
     trials = trials.assign(off=off.where(landed(trials)))
     targets = dict(zip(sorted(set(trials.target)), MARKS, strict=False))
     title = "Nearer to the line is better: every launch, beside its target"
-    figure, found, beyond = _rows(trials, styles, title, trials.off)
-    for band, ax in found.items():
+    figure, axes, beyond = _rows(trials, styles, title, trials.off)
+    for band, ax in axes.items():
         floor = 100 * floors.get(band, 0)
         ax.axvspan(-floor, floor, color=SHADE, lw=0)
         for row, method in enumerate(styles):
@@ -56,7 +56,7 @@ def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> Fi
                 where = {"transform": ax.get_yaxis_transform(), "fontsize": 7}
                 text = f"{failed} of {len(mine)} failed"
                 ax.text(0.01 if left else 0.99, row, text, **words, **where)
-    [*found.values()][-1].set_xlabel(f"landing − target [cm]{beyond}")
+    [*axes.values()][-1].set_xlabel(f"landing − target [cm]{beyond}")
     dot = {"ls": "", "color": "0.4"}
     entries: list[tuple[str, Artist]] = [
         (f"aimed at {t:g} m", mark(**dot, marker=m)) for t, m in targets.items()
@@ -86,9 +86,9 @@ def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> Fi
     trials = trials.assign(off=off, low=low, high=high).reset_index(drop=True)
     inside = trials.stretch <= trials.recorded_stretch
     title = "A good prediction lies at zero, in a short interval that holds zero"
-    figure, found, beyond = _rows(trials, styles, title, off)
+    figure, axes, beyond = _rows(trials, styles, title, off)
     trials = trials.sort_values(["target", "landing_y"])
-    for band, ax in found.items():
+    for band, ax in axes.items():
         ax.axvspan(-FAIR, FAIR, color=SHADE, lw=0)
         for row, method in enumerate(styles):
             mine = trials.loc[(trials.band == band) & (trials.method == method)]
@@ -97,7 +97,7 @@ def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> Fi
             ax.hlines(height, mine.low, mine.high, color=color, lw=0.9, ls=line, zorder=2)
             face = np.where(inside[mine.index], color, "none")
             ax.scatter(mine.off, height, s=9, facecolors=face, edgecolors=color, lw=0.7, zorder=3)
-    [*found.values()][-1].set_xlabel(f"predicted / landed − 1 [%]{beyond}")
+    [*axes.values()][-1].set_xlabel(f"predicted / landed − 1 [%]{beyond}")
     dot = {"ls": "", "marker": "o", "ms": 4, "color": "0.4"}
     entries = [("a launch", mark(**dot))]
     if not inside.all():
@@ -116,9 +116,9 @@ def _rows(trials: pd.DataFrame, styles: Styles, title: str, off: pd.Series):
     """A panel a band with a row a method, an axis that reaches as far as `off`, and its label."""
     bands = dict.fromkeys(trials.band)
     tall = 0.3 * len(styles) + 0.6
-    figure, found = panels(bands or [""], title, tall, columns=1, sharex=True, sharey=True)
+    figure, axes = panels(bands or [""], title, tall, columns=1, sharex=True, sharey=True)
     most = max(LINEAR, 1.1 * float(np.nanmax(off.abs(), initial=0)))
-    for ax in found.values():
+    for ax in axes.values():
         ax.axvline(0, color=INK, lw=0.8, zorder=1)
         ax.set_yticks(range(len(styles)), [style.name for style in styles.values()])
         ax.set_ylim(len(styles) - 0.5, -0.6)
@@ -129,7 +129,7 @@ def _rows(trials: pd.DataFrame, styles: Styles, title: str, off: pd.Series):
         ax.xaxis.set_major_formatter("{x:g}")
         for label, style in zip(ax.get_yticklabels(), styles.values(), strict=False):
             label.set_color(style.color)
-    return figure, found, f", logarithmic beyond ± {LINEAR}" * (most > LINEAR)
+    return figure, axes, f", logarithmic beyond ± {LINEAR}" * (most > LINEAR)
 
 
 def _spread(count: int) -> np.ndarray:

@@ -40,13 +40,13 @@ def panels(
     figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, **more)
     for ax in axes.flat[len(bands) :]:
         ax.remove()
-    found = dict(zip(bands, axes.flat, strict=False))
-    for band, ax in found.items():
+    by_band = dict(zip(bands, axes.flat, strict=False))
+    for band, ax in by_band.items():
         ax.set_title(band, fontsize=9)
     for ax in axes.flat[len(bands) - columns : len(bands)]:  # the lowest of each column
         ax.tick_params(labelbottom=True)
     entitle(figure, title)
-    return figure, found
+    return figure, by_band
 
 
 def explain(figure: Figure, entries: Iterable[tuple[str, Artist]]) -> None:

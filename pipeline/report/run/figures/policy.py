@@ -29,15 +29,15 @@ def training(curves: dict[str, dict[str, pd.DataFrame]], styles: Styles) -> Figu
         curves: training.parquet of each band and method.
     """
     title = "A policy has converged where its curve stays below the line at 1 cm"
-    figure, found = panels(curves, title, 2.1, sharex=True, sharey=True)
-    for band, ax in found.items():
+    figure, axes_of = panels(curves, title, 2.1, sharex=True, sharey=True)
+    for band, ax in axes_of.items():
         for (method, curve), dash in zip(curves[band].items(), cycle(DASHES)):
             error = 100 * curve.mean_error
             ax.plot(curve.iteration, error, color=styles[method].color, lw=1.2, ls=dash)
         ax.axhline(1, color=INK, lw=0.8)
         ax.set_xlabel("PPO iteration (line: 1 cm)")
         log_y(ax)
-    next(iter(found.values())).set_ylabel("mean |landing − target| [cm]")
+    next(iter(axes_of.values())).set_ylabel("mean |landing − target| [cm]")
     methods = dict.fromkeys(method for of_band in curves.values() for method in of_band)
     dashes = dict(zip(methods, cycle(DASHES)))
     explain(figure, [(styles[m].name, mark(color=styles[m].color, ls=dashes[m])) for m in methods])
@@ -63,15 +63,17 @@ def landing_maps(
         rest_lengths: By band [m].
     """
     title = "Where each draw lands, and which draws the policy takes for near and far targets"
-    figure, found = panels(maps, title, 2.6, sharex=True, sharey=True)
+    figure, axes_of = panels(maps, title, 2.6, sharex=True, sharey=True)
     low = np.min([path.min(0) for path in draws.values()], axis=0) - AROUND
     high = np.max([path.max(0) for path in draws.values()], axis=0) + AROUND
-    charts = {band: _fine(one, low, high) for band, one in maps.items()}
-    known = np.concatenate([landing[np.isfinite(landing)] for *_, landing in charts.values()])
-    levels = MaxNLocator(16).tick_values(known.min(), known.max()) if len(known) else [0, 1]
+    charts = {band: _fine(landing_map, low, high) for band, landing_map in maps.items()}
+    landings = np.concatenate([landing[np.isfinite(landing)] for *_, landing in charts.values()])
+    levels = (
+        MaxNLocator(16).tick_values(landings.min(), landings.max()) if len(landings) else [0, 1]
+    )
     shades = plt.cm.ScalarMappable(BoundaryNorm(levels, 256), "cividis")
     beyond = False
-    for band, ax in found.items():
+    for band, ax in axes_of.items():
         y, z, landing = charts[band]
         points = np.stack([0 * y.ravel(), y.ravel(), z.ravel()], 1)
         stretch = stretch_of(points, fork_width, rest_lengths[band]).reshape(y.shape)
@@ -86,8 +88,8 @@ def landing_maps(
         ax.plot(*draws[band].T, color=COLORS[0], lw=2.5)
         ax.plot(*draws[band][0], "o", color=COLORS[0])
         ax.set(xlabel="draw y [m]", xlim=y[[0, -1], 0], ylim=z[0, [0, -1]])
-    next(iter(found.values())).set_ylabel("draw z [m]")
-    figure.colorbar(shades, ax=list(found.values()), label="simulated landing [m]")
+    next(iter(axes_of.values())).set_ylabel("draw z [m]")
+    figure.colorbar(shades, ax=list(axes_of.values()), label="simulated landing [m]")
     entries = [("policy's draws, from near (dot) to far", mark(color=COLORS[0], lw=2.5))]
     if beyond:
         entries.append(("recorded stretch; left: extrapolated", mark(color="k", ls=":")))

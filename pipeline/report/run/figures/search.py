@@ -39,10 +39,10 @@ def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> Figur
         searches: By band and method. A method that minimises another loss may rise.
     """
     title = "Lower is a better fit, further left a cheaper one: the paper's loss so far"
-    figure, found = panels(searches, title, 2.4, sharex=True)
+    figure, axes_of = panels(searches, title, 2.4, sharex=True)
     methods = dict.fromkeys(method for of_band in searches.values() for method in of_band)
     dashes = dict(zip(methods, cycle(DASHES)))
-    for band, ax in found.items():
+    for band, ax in axes_of.items():
         ends = []
         for method, result in searches[band].items():
             common = printed(result.history)
@@ -56,7 +56,7 @@ def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> Figur
         ax.set_ylim(0.97 * least, max((1 + NEAR) * least, 1.03 * np.nanmax(ends)))
         ax.set_xlabel("rollouts")
         log_y(ax)
-    next(iter(found.values())).set_ylabel("geom + force + work")
+    next(iter(axes_of.values())).set_ylabel("geom + force + work")
     entries = [(styles[m].name, mark(color=styles[m].color, ls=dashes[m])) for m in methods]
     explain(figure, entries)
     return figure

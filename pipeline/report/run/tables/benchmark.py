@@ -70,9 +70,9 @@ def _rows(results: Results, band: str, methods: Iterable[str]) -> list[Row]:
     rows = []
     for method in methods:
         result = results.methods[band].get(method)
-        found = [] if result is None else _launched(result.trials)
-        rows += [Row(band, method, kind, errors) for kind, errors in found]
-        if found and (cells := paper.LANDING.get((band, method))):
+        own_rows = [] if result is None else _launched(result.trials)
+        rows += [Row(band, method, kind, errors) for kind, errors in own_rows]
+        if own_rows and (cells := paper.LANDING.get((band, method))):
             rows.append(Row(band, method, PAPER, _papers(cells)))
     return rows
 
@@ -96,12 +96,12 @@ def _papers(cells: tuple) -> dict[float | str, LandingErrors]:
 def _floor(floor: dict) -> dict[float | str, LandingErrors]:
     """The oracle's launches (rig/oracle/floor.py)."""
 
-    def errors(one: dict) -> LandingErrors:
-        known = (one.get(name) for name in ("mean_error_m", "std_m", "bias_m"))
-        mean, std, bias = (math.nan if value is None else value for value in known)
-        return LandingErrors(one["launches"], one.get("failed", 0), mean, std, std, bias)
+    def errors(content: dict) -> LandingErrors:
+        numbers = (content.get(name) for name in ("mean_error_m", "std_m", "bias_m"))
+        mean, std, bias = (math.nan if value is None else value for value in numbers)
+        return LandingErrors(content["launches"], content.get("failed", 0), mean, std, std, bias)
 
-    result = {float(g): errors(one) for g, one in floor["targets"].items()}
+    result = {float(g): errors(content) for g, content in floor["targets"].items()}
     return {**result, "all": replace(errors(floor), within=within(result.values()))}
 
 
@@ -115,10 +115,10 @@ def as_table(rows: list[Row], targets: Iterable[float], styles: Styles) -> Table
     for row in rows:
         cells = []
         for key in keys:
-            one = row.errors.get(key)
+            errors = row.errors.get(key)
             least = lowest[key].get((row.band, row.source))
-            bold = "**" if one and not one.failed and one.mean == least else ""
-            cells.append(bold + spread(one) + bold)
+            bold = "**" if errors and not errors.failed and errors.mean == least else ""
+            cells.append(bold + spread(errors) + bold)
         total = row.errors["all"]
         failed = NONE if total.failed is None else f"{total.failed} of {total.launches}"
         names = band_name(row.band), method_name(row.method, styles), row.source
@@ -131,21 +131,21 @@ def _lowest(rows: list[Row], key: float | str) -> dict[tuple[str, str], float]:
     """The lowest mean of each band and kind of which two methods or more have no failures."""
     means: dict[tuple[str, str], list[float]] = {}
     for row in rows:
-        one = row.errors.get(key)
-        if one and not one.failed and np.isfinite(one.mean):
-            means.setdefault((row.band, row.source), []).append(one.mean)
+        errors = row.errors.get(key)
+        if errors and not errors.failed and np.isfinite(errors.mean):
+            means.setdefault((row.band, row.source), []).append(errors.mean)
     return {group: min(some) for group, some in means.items() if len(some) > 1}
 
 
-def spread(one: LandingErrors | None) -> str:
+def spread(errors: LandingErrors | None) -> str:
     """Mean ± deviation [cm]; N/A where no launch counts; partial failures are counted."""
-    if one is None:
+    if errors is None:
         return NONE
-    if not np.isfinite(one.mean):
+    if not np.isfinite(errors.mean):
         return "N/A"
-    around = number(100 * one.within, ".2f", "")
-    failed = f", {one.failed} failed" if one.failed else ""
-    return f"{100 * one.mean:.2f}{' ± ' * bool(around)}{around}{failed}"
+    around = number(100 * errors.within, ".2f", "")
+    failed = f", {errors.failed} failed" if errors.failed else ""
+    return f"{100 * errors.mean:.2f}{' ± ' * bool(around)}{around}{failed}"
 
 
 def band_name(band: str) -> str:
@@ -166,14 +166,14 @@ def records(rows: list[Row]) -> pd.DataFrame:
             "method": row.method,
             "source": row.source,
             "target_m": key,
-            "launches": one.launches,
-            "failed": one.failed,
-            "mean_error_cm": number(100 * one.mean, ".4g", "N/A"),
-            "std_cm": 100 * one.std,
-            "std_within_targets_cm": 100 * one.within,
-            "bias_cm": 100 * one.bias,
+            "launches": errors.launches,
+            "failed": errors.failed,
+            "mean_error_cm": number(100 * errors.mean, ".4g", "N/A"),
+            "std_cm": 100 * errors.std,
+            "std_within_targets_cm": 100 * errors.within,
+            "bias_cm": 100 * errors.bias,
         }
         for row in rows
-        for key, one in row.errors.items()
+        for key, errors in row.errors.items()
     )
     return pd.DataFrame(lines).astype({"failed": "Int64"})

@@ -22,7 +22,7 @@ class Compared(NamedTuple):
     band: str
     method: str
     kind: str
-    found: dict[str, Difference | None]
+    beside: dict[str, Difference | None]
 
 
 def compared(results: Results, references: Iterable[str], seed: int) -> list[Compared]:
@@ -30,35 +30,38 @@ def compared(results: Results, references: Iterable[str], seed: int) -> list[Com
     rows = []
     for band, of_band in results.methods.items():
         for kind in LAUNCHED:
-            some = {method: of_kind(one.trials, kind) for method, one in of_band.items()}
-            aimed = {method: one.loc[one.target.notna()] for method, one in some.items()}
+            some = {method: of_kind(result.trials, kind) for method, result in of_band.items()}
+            aimed = {
+                method: trials_of.loc[trials_of.target.notna()]
+                for method, trials_of in some.items()
+            }
             for method, trials in aimed.items():
                 others = [m for m in references if m != method and len(aimed.get(m, ()))]
-                found = {other: difference(aimed[other], trials, seed) for other in others}
-                if found and len(trials):
-                    rows.append(Compared(band, method, kind, found))
+                differences = {other: difference(aimed[other], trials, seed) for other in others}
+                if differences and len(trials):
+                    rows.append(Compared(band, method, kind, differences))
     return rows
 
 
 def as_table(rows: list[Compared], styles: Styles) -> Table:
     """Differences in cm with their intervals; bold where the interval leaves out zero."""
-    beside = [m for m in styles if any(m in row.found for row in rows)]
+    beside = [m for m in styles if any(m in row.beside for row in rows)]
     lines = []
-    for band, method, kind, found in rows:
-        cells = (shown(found[one]) if one in found else NONE for one in beside)
+    for band, method, kind, differences in rows:
+        cells = (shown(differences[other]) if other in differences else NONE for other in beside)
         lines.append([band_name(band), styles[method].name, kind, *cells])
     return ["band", "method", "launches", *(f"beside {styles[m].name}" for m in beside)], lines
 
 
-def shown(one: Difference | None) -> str:
+def shown(against: Difference | None) -> str:
     """As in "+3.20 (+2.10 to +4.40)"."""
-    if one is None:
+    if against is None:
         return "N/A"
-    text = _signed(one.mean)
-    if np.isfinite(one.low):
-        text += f" ({_signed(one.low)} to {_signed(one.high)})"
-    text = f"**{text}**" if one.real else text
-    return text + (f", {one.left_out} left out" if one.left_out else "")
+    text = _signed(against.mean)
+    if np.isfinite(against.low):
+        text += f" ({_signed(against.low)} to {_signed(against.high)})"
+    text = f"**{text}**" if against.real else text
+    return text + (f", {against.left_out} left out" if against.left_out else "")
 
 
 def _signed(metres: float) -> str:
@@ -73,16 +76,16 @@ def records(rows: list[Compared]) -> pd.DataFrame:
             "method": method,
             "source": kind,
             "beside": reference,
-            "difference_cm": 100 * one.mean,
-            "low_95_cm": 100 * one.low,
-            "high_95_cm": 100 * one.high,
-            "launches": one.launches[1],
-            "launches_beside": one.launches[0],
-            "failed_share": one.failed[1],
-            "failed_share_beside": one.failed[0],
-            "left_out": one.left_out,
+            "difference_cm": 100 * against.mean,
+            "low_95_cm": 100 * against.low,
+            "high_95_cm": 100 * against.high,
+            "launches": against.launches[1],
+            "launches_beside": against.launches[0],
+            "failed_share": against.failed[1],
+            "failed_share_beside": against.failed[0],
+            "left_out": against.left_out,
         }
-        for band, method, kind, found in rows
-        for reference, one in found.items()
-        if one is not None
+        for band, method, kind, differences in rows
+        for reference, against in differences.items()
+        if against is not None
     )

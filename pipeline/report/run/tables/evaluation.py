@@ -59,8 +59,8 @@ def sensitivity(
         if path is None:
             continue
         slope = steepness(result, path)
-        known = slope[np.isfinite(slope)]
-        ends = (known.min(), np.median(known), known.max()) if len(known) else (np.nan,) * 3
+        finite = slope[np.isfinite(slope)]
+        ends = (finite.min(), np.median(finite), finite.max()) if len(finite) else (np.nan,) * 3
         name = styles[result.method].name
         rows.append([band_name(result.band), name, *(number(end, ".0f") for end in ends)])
     return ["band", "method", "least [cm]", "median [cm]", "most [cm]"], rows
@@ -95,21 +95,21 @@ class Hanging:
 
 def hanging(params: Params, results: Results, methods: tuple[str, ...]) -> list[Hanging]:
     """Of every band: the rig's rubber where it is known, then the methods that ran."""
-    found = []
+    rows = []
     for band, ran in results.methods.items():
         rest = params.bands[band].rest_length / 2
         recorded = float(next(iter(ran.values())).trials.recorded_stretch.max())
         true = results.floors.get(band, {}).get("hanging_stretch", {})
         if true:
             lengths = {n: rest * (true.get(str(n)) or math.nan) for n in READINGS}
-            found.append(Hanging(band, None, rest, lengths, recorded))
+            rows.append(Hanging(band, None, rest, lengths, recorded))
         for method in methods:
             if method in ran:
                 theta = ran[method].theta
                 sling, best = calibrated(params, band, theta), parameters_of(theta)
                 lengths = {n: rest * hanging_stretch(sling, best, n) for n in READINGS}
-                found.append(Hanging(band, method, rest, lengths, recorded))
-    return found
+                rows.append(Hanging(band, method, rest, lengths, recorded))
+    return rows
 
 
 def hanging_table(rows: list[Hanging], styles: Styles) -> Table:
@@ -126,4 +126,9 @@ def hanging_table(rows: list[Hanging], styles: Styles) -> Table:
             cells.append(f"{cell} ({off} %)" if off else cell)
         name = "the rig's rubber" if row.method is None else styles[row.method].name
         lines.append([band_name(row.band), name, f"{100 * row.rest:.0f}", *cells])
-    return ["band", "by", "without [cm]", *(f"{one} [cm]" for one in READINGS.values())], lines
+    return [
+        "band",
+        "by",
+        "without [cm]",
+        *(f"{reading} [cm]" for reading in READINGS.values()),
+    ], lines

@@ -30,21 +30,21 @@ def methods(results: Results, params: Params, styles: Styles) -> Table:
     """What each method searched, what it minimises, and what it holds fixed."""
     rows = []
     for method, style in styles.items():
-        about = params.methods[method]
+        method_params = params.methods[method]
         terms = [
             term if weight == 1 else f"{weight:g} {term}"
-            for term, weight in dict(about.weights).items()
+            for term, weight in dict(method_params.weights).items()
             if weight
         ]
-        search = SEARCHES.get(about.search, f"`{about.search}`")
-        if about.search == "multistart":
-            found = {len(one.regions) for one in results if one.method == method}
-            regions = " to ".join(str(count) for count in sorted({min(found), max(found)}))
-            search = f"DE, then CMA-ES in {regions} region{'s' if max(found) > 1 else ''}"
-            search += "" if about.covariance else ", isotropic starts"
-        fixed = [_held(name, value) for name, value in about.fixed.items()]
+        search = SEARCHES.get(method_params.search, f"`{method_params.search}`")
+        if method_params.search == "multistart":
+            counts = {len(result.regions) for result in results if result.method == method}
+            regions = " to ".join(str(count) for count in sorted({min(counts), max(counts)}))
+            search = f"DE, then CMA-ES in {regions} region{'s' if max(counts) > 1 else ''}"
+            search += "" if method_params.covariance else ", isotropic starts"
+        fixed = [_held(name, value) for name, value in method_params.fixed.items()]
         held = ", ".join(fixed) or NONE
-        if about.search == LEAST_SQUARES:
+        if method_params.search == LEAST_SQUARES:
             terms = ["−2 log p of all recordings and launches"]
         rows.append([style.name, f"`{method}`", search, " + ".join(terms), held])
     return ["method", "in params.yaml", "search", "minimises", "held fixed"], rows
@@ -60,26 +60,28 @@ def derived(results: Results, styles: Styles) -> Table | None:
     shown = [result for result in results if result.confidence]
     if not shown:
         return None
-    found = {name: one for r in shown for name, one in r.confidence["derived"].items()}
-    quantities = {name: one for name, one in QUANTITIES.items() if name in found}
-    for name in sorted(found.keys() - quantities):
+    present = {name: entry for r in shown for name, entry in r.confidence["derived"].items()}
+    quantities = {name: quantity for name, quantity in QUANTITIES.items() if name in present}
+    for name in sorted(present.keys() - quantities):
         words = name.replace("_", " ")
-        quantities[name] = Quantity(words, words, found[name]["unit"])
+        quantities[name] = Quantity(words, words, present[name]["unit"])
     rows = []
     for result in shown:
-        own = result.confidence["derived"]
-        cells = [ranged(own.get(name), one.factor) for name, one in quantities.items()]
+        entries = result.confidence["derived"]
+        cells = [
+            ranged(entries.get(name), quantity.factor) for name, quantity in quantities.items()
+        ]
         rows.append([result.band, styles[result.method].name, *cells])
-    return ["band", "method", *(one.heading for one in quantities.values())], rows
+    return ["band", "method", *(quantity.heading for quantity in quantities.values())], rows
 
 
-def ranged(about: dict | None, factor: float) -> str:
+def ranged(entry: dict | None, factor: float) -> str:
     """A value and its interval, with as many digits as the interval's width deserves."""
-    if about is None:
+    if entry is None:
         return NONE
-    if "low" not in about:
-        return f"{factor * about['value']:.3g}"
-    value, low, high = (factor * about[key] for key in ("value", "low", "high"))
+    if "low" not in entry:
+        return f"{factor * entry['value']:.3g}"
+    value, low, high = (factor * entry[key] for key in ("value", "low", "high"))
     width = high - low
     if width <= 0:
         return f"{value:.3g}, fixed"
@@ -94,18 +96,18 @@ def recordings(results: Results, styles: Styles) -> Table:
     """
     rows = []
     for result in results:
-        for count, about in enumerate(result.confidence.get("recordings", []), 1):
-            file, without = about.get("source", {}).get("file"), about.get("without_it")
-            moved = without and max(without["moved"].items(), key=lambda one: abs(one[1]))
+        for count, recording in enumerate(result.confidence.get("recordings", []), 1):
+            file, without = recording.get("source", {}).get("file"), recording.get("without_it")
+            moved = without and max(without["moved"].items(), key=lambda pair: abs(pair[1]))
             rows.append(
                 [
                     result.band,
                     styles[result.method].name,
                     cell(as_code(file)) if file else str(count),
-                    f"{1e3 * about['force_rms']:.0f}",
-                    f"{1e3 * about['held_rms']:.1f}",
-                    f"{1e3 * about['recoil_rms']:.1f}",
-                    ", ".join(f"{1e3 * time:.0f}" for time in about["pictures"]) or NONE,
+                    f"{1e3 * recording['force_rms']:.0f}",
+                    f"{1e3 * recording['held_rms']:.1f}",
+                    f"{1e3 * recording['recoil_rms']:.1f}",
+                    ", ".join(f"{1e3 * time:.0f}" for time in recording["pictures"]) or NONE,
                     f"{without['misfit']:.1f}" if without else NONE,
                     f"{coordinate(moved[0])} {moved[1]:+.1f} sd" if moved else NONE,
                 ]
@@ -120,12 +122,12 @@ def observed(results: Results, styles: Styles) -> Table | None:
         [
             result.band,
             styles[result.method].name,
-            f"{one['draw'][0]:.3f}, {one['draw'][1]:.3f}",
-            number(one["landing"], ".3f"),
-            NONE if one["left"] is None else f"{100 * one['left']:+.1f} %",
+            f"{launch['draw'][0]:.3f}, {launch['draw'][1]:.3f}",
+            number(launch["landing"], ".3f"),
+            NONE if launch["left"] is None else f"{100 * launch['left']:+.1f} %",
         ]
         for result in results
-        for one in result.confidence.get("launches", [])
+        for launch in result.confidence.get("launches", [])
     ]
     heads = ["band", "method", "draw (y, z) [m]", "landing [m]", "farther than simulated"]
     return (heads, rows) if rows else None
@@ -133,8 +135,10 @@ def observed(results: Results, styles: Styles) -> Table | None:
 
 def losses(results: Results, params: Params, styles: Styles) -> Table:
     """Terms of the loss at θ, the share that each weighs, the printed total, and the budget."""
-    found = {term for one in results for term in one.theta.get("loss", {}) if term != "total"}
-    terms = TERMS | {term: term for term in sorted(found - TERMS.keys())}
+    loss_terms = {
+        term for of_result in results for term in of_result.theta.get("loss", {}) if term != "total"
+    }
+    terms = TERMS | {term: term for term in sorted(loss_terms - TERMS.keys())}
     heads = ["band", "method", *terms.values(), "total of its own loss", "printed loss", "rollouts"]
     rows = []
     for result in results:

@@ -68,9 +68,9 @@ def landing_errors(trials: pd.DataFrame) -> dict[float | str, LandingErrors]:
 
 def within(parts: Iterable[LandingErrors]) -> float:
     """Deviation within targets, each weighed by its launches less one [m]; NaN of none."""
-    known = [(n.launches - (n.failed or 0) - 1, n.std) for n in parts if np.isfinite(n.std)]
-    freedom = sum(count for count, _ in known)
-    return math.sqrt(sum(n * std**2 for n, std in known) / freedom) if freedom else math.nan
+    weighed = [(n.launches - (n.failed or 0) - 1, n.std) for n in parts if np.isfinite(n.std)]
+    freedom = sum(count for count, _ in weighed)
+    return math.sqrt(sum(n * std**2 for n, std in weighed) / freedom) if freedom else math.nan
 
 
 def predictions(trials: pd.DataFrame) -> Table:

@@ -37,16 +37,16 @@ def outcome(results: Results, references: tuple[str, ...], styles: Styles) -> Ta
     for name, band, trials in _launched(results, references):
         for kind in LAUNCHED:
             floor = results.least.get(band) if kind == "virtual" else None
-            some = [of_kind(one, kind) for one in trials]
+            some = [of_kind(trial, kind) for trial in trials]
             if some[0].empty:
                 continue
-            found = [_errors(one) for one in some] + [None] * (len(references) - len(some))
+            errors = [_errors(result) for result in some] + [None] * (len(references) - len(some))
             parts, ranges = prediction_error(some[0])["all"], intervals(some[0]) or {}
-            cells = [number(100 * one.mean, ".1f", "N/A") if one else NONE for one in found]
-            own = found[0].mean if found[0] else None
+            cells = [number(100 * error.mean, ".1f", "N/A") if error else NONE for error in errors]
+            main_mean = errors[0].mean if errors[0] else None
             cells += [number(floor and 100 * floor, ".1f")]
-            cells += [number(own and floor and own / floor, ".1f")]
-            failed = [str(one.failed) for one in found if one]
+            cells += [number(main_mean and floor and main_mean / floor, ".1f")]
+            failed = [str(error.failed) for error in errors if error]
             cells += [" · ".join(failed) or NONE]
             cells += [number(100 * parts.mean, ".1f"), number(100 * parts.bias, "+.1f")]
             rows.append([name, f"{len(some[0])} {kind}", *cells, coverage(ranges.get("all"))])
@@ -78,9 +78,9 @@ def values(results: Results, bands: list[str], method: str) -> Table:
     rows = []
     for band in bands:
         result = results.methods[band][method]
-        known = {name: {"value": one} for name, one in result.theta["theta"].items()}
+        entries = {name: {"value": value} for name, value in result.theta["theta"].items()}
         for group in ("parameters", "derived"):
-            for name, about in result.confidence.get(group, {}).items():
-                known[name] = known.get(name, {}) | about
-        rows.append([band, *(ranged(known.get(n), QUANTITIES[n].factor) for n in VALUES)])
+            for name, entry in result.confidence.get(group, {}).items():
+                entries[name] = entries.get(name, {}) | entry
+        rows.append([band, *(ranged(entries.get(n), QUANTITIES[n].factor) for n in VALUES)])
     return without_empty((["band", *(QUANTITIES[name].heading for name in VALUES)], rows))

@@ -68,7 +68,9 @@ def identified(results: Results, params: Params) -> list[IdentifiedRow]:
                 rows.append(IdentifiedRow(band, method, PRIOR, priors, math.nan))
             if cells := paper.THETA.get((band, method)):
                 *numbers, loss = cells
-                theirs = {str(n): Value(one) for n, one in zip(THETA, numbers, strict=True)}
+                theirs = {
+                    str(n): Value(number_i) for n, number_i in zip(THETA, numbers, strict=True)
+                }
                 rows.append(IdentifiedRow(band, method, PAPER, theirs, loss))
     return rows
 
@@ -85,18 +87,18 @@ def _value(params: Params, result: Result, name: str) -> Value:
         return Value(value, "fixed")
     box = SearchBox.of_method(params, result.method)
     edge = name in box.names and at_edge(value, name, box)
-    about = result.confidence.get("parameters", {}).get(name)
-    if about is None:
+    entry = result.confidence.get("parameters", {}).get(name)
+    if entry is None:
         return Value(value, at_edge=edge)
-    state = "identified" if about["identifiable"] else "not identifiable"
-    return Value(value, state, about["low"], about["high"], edge)
+    state = "identified" if entry["identifiable"] else "not identifiable"
+    return Value(value, state, entry["low"], entry["high"], edge)
 
 
 def _priors(result: Result) -> dict[str, Value]:
     """What a density's method knows of each parameter without the recording."""
-    about = result.confidence.get("parameters", {})
-    known = {name: one["prior"] for name, one in about.items() if one.get("prior")}
-    return {name: Value(math.nan, PRIOR, *ends) for name, ends in known.items()}
+    entries = result.confidence.get("parameters", {})
+    priors = {name: entry["prior"] for name, entry in entries.items() if entry.get("prior")}
+    return {name: Value(math.nan, PRIOR, *ends) for name, ends in priors.items()}
 
 
 def at_edge(value: float, name: str, box: SearchBox) -> bool:
@@ -130,14 +132,14 @@ def _shown(rows: list[IdentifiedRow]) -> list[str]:
     return [name for name in NAMES if name in THETA or any(name in row.values for row in rows)]
 
 
-def _cell(name: str, one: Value) -> str:
-    if one.state == PRIOR:
-        return _between(name, one.low, one.high)
-    shown = _physical(name, one.value) + (" ⚠" if one.at_edge else "")
-    if one.state != "identified":
-        return f"{shown}, {one.state}" if one.state else shown
-    outside = "" if one.low <= one.value <= one.high else " †"
-    return f"{shown}{outside} ({_between(name, one.low, one.high)})"
+def _cell(name: str, value: Value) -> str:
+    if value.state == PRIOR:
+        return _between(name, value.low, value.high)
+    shown = _physical(name, value.value) + (" ⚠" if value.at_edge else "")
+    if value.state != "identified":
+        return f"{shown}, {value.state}" if value.state else shown
+    outside = "" if value.low <= value.value <= value.high else " †"
+    return f"{shown}{outside} ({_between(name, value.low, value.high)})"
 
 
 def _between(name: str, low: float, high: float) -> str:
@@ -172,10 +174,14 @@ def records(rows: list[IdentifiedRow]) -> pd.DataFrame:
         line: dict[str, str | float | None]
         line = {"band": row.band, "method": row.method, "source": row.source}
         for name in _shown(rows):
-            one = row.values.get(name, Value(math.nan))
+            value_of = row.values.get(name, Value(math.nan))
             unit = f"_{SI_UNITS[name].lower()}" if name in SI_UNITS else ""
-            for part, value in (("", one.value), ("_low", one.low), ("_high", one.high)):
+            for part, value in (
+                ("", value_of.value),
+                ("_low", value_of.low),
+                ("_high", value_of.high),
+            ):
                 line[f"{name}{part}{unit}"] = value
-            line[f"{name}_state"] = one.state or None
+            line[f"{name}_state"] = value_of.state or None
         lines.append(line | {"loss": row.loss})
     return pd.DataFrame(lines)

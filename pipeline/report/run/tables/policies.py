@@ -11,12 +11,12 @@ def policies(results: Results, styles: Styles) -> Table:
     """How each policy converged in its own simulator, and how well its map interpolates."""
     heads = ["band", "method", "converged", "mean error [cm]", "largest", "failed targets"]
     rows = []
-    for one in results:
-        training, near = one.card["training"], one.card["landing_map"]["target_range"]
+    for result in results:
+        training, near = result.card["training"], result.card["landing_map"]["target_range"]
         rows.append(
             [
-                one.band,
-                styles[one.method].name,
+                result.band,
+                styles[result.method].name,
                 "yes" if training["converged"] else "**no**",
                 *_errors(training),
                 str(training.get("failed_targets", NONE)),
@@ -26,5 +26,5 @@ def policies(results: Results, styles: Styles) -> Table:
     return [*heads, "map error [cm]", "largest"], rows
 
 
-def _errors(about: dict) -> list[str]:
-    return [centimetres(about[name]) for name in ("mean_error_m", "max_error_m")]
+def _errors(content: dict) -> list[str]:
+    return [centimetres(content[name]) for name in ("mean_error_m", "max_error_m")]

@@ -48,19 +48,23 @@ def name_of(method: str) -> str:
     return PLAIN.get(method) or styles([method])[method].name
 
 
-def difference(one: Against | None) -> str:
+def difference(against: Against | None) -> str:
     """As in "+3.2 (+1.1 to +5.0)", bold where it counts."""
-    if one is None:
+    if against is None:
         return NONE
-    text = f"{one.mean:+.1f} ({one.low:+.1f} to {one.high:+.1f})".replace("-", "−")
-    return f"**{text}**" if one.real else text
+    text = f"{against.mean:+.1f} ({against.low:+.1f} to {against.high:+.1f})".replace("-", "−")
+    return f"**{text}**" if against.real else text
 
 
-def _mean(one: MeanInterval | None) -> str:
-    return NONE if one is None else f"{one.mean:.1f} ({one.low:.1f} to {one.high:.1f})"
+def _mean(interval: MeanInterval | None) -> str:
+    return (
+        NONE
+        if interval is None
+        else f"{interval.mean:.1f} ({interval.low:.1f} to {interval.high:.1f})"
+    )
 
 
-def _p(one: Against | None) -> str:
-    if one is None:
+def _p(against: Against | None) -> str:
+    if against is None:
         return NONE
-    return "< 0.001" if one.p < 0.001 else f"{one.p:.2g}"
+    return "< 0.001" if against.p < 0.001 else f"{against.p:.2g}"

@@ -137,7 +137,7 @@ def calibrate_clamps(
 
     start = float(losses(0.0, np.array([1.0]))[0])
     coarse = best(np.linspace(*ANGLE, 10), np.geomspace(*RIGIDITY, 16))
-    for width in (1.0, 0.3):  # around the best, ten degrees and half a decade on each side
+    for width in (1.0, 0.3):  # finer around the best: 9 degrees and a factor of 3, then a third
         coarse = min(
             coarse,
             best(

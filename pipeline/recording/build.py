@@ -74,7 +74,10 @@ def process_pulls(
 
 
 def process_pull(pull: Pull, band: BandParams, params: Params) -> Checked:
-    """All of one pull. Raises UserError where it cannot be used."""
+    """Process one pull: correct its delays, then run all checks, which ask for signals and clouds.
+
+    Raises UserError where it cannot be used.
+    """
     done = Checked.of(pull, band, params)
     if done.refusal:
         raise UserError(str(done.refusal))

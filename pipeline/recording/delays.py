@@ -123,7 +123,7 @@ def correct_delays(pull: Pull, params: Params) -> tuple[Pull, Delays]:
     The camera's is estimated against the pose, after that was corrected, then against the release.
     Where the pictures of the release are off, the hand is looked for from there on.
     """
-    given, off = params.episode.delays, pull.recording.late
+    given, off = params.episode.delays, pull.recording.late  # what reading it took off already
     pull = _put_right(pull, (given.pose or 0.0) - off.get("pose", 0.0))
     pull = _put_right(pull, camera=(given.camera or 0.0) - off.get("color", 0.0))
     inertia = _or_none(lambda: estimate_tool_inertia(pull, params.setup.tool))

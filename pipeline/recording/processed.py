@@ -21,7 +21,9 @@ from pipeline.recording.view import Scene, View
 
 @dataclass(frozen=True)
 class Processed:
-    """Every step's result for one pull. What is below `delays` is computed when first asked for.
+    """Every step's result for one pull: its delays, then signals, scene, view, clouds, in order.
+
+    What is below `delays` is computed when first asked for.
 
     Attributes:
         pull: With the stamps corrected by `delays`.
@@ -34,6 +36,7 @@ class Processed:
 
     @classmethod
     def of(cls, pull: Pull, band: BandParams, params: Params) -> Self:
+        """Correct the delays of its streams. Raises UserError."""
         return cls(*correct_delays(pull, params), band, params)
 
     @cached_property

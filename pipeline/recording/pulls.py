@@ -55,7 +55,10 @@ class Pull:
 
     @classmethod
     def of(cls, recording: Recording, setup: SetupParams) -> Pull:
-        """All of a recording. Raises UserError where a frame is missing."""
+        """The whole recording as if it were one pull; `pulls_of` parts it.
+
+        Raises UserError where a frame is missing.
+        """
         return cls(recording, geometry_of(recording, setup))
 
     @cached_property

@@ -136,7 +136,8 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
     tool, episode, recording = params.setup.tool, params.episode, pull.recording
     inertia = inertia if tool is None else None
     expect_dense(recording.wrench)
-    t, raw, motion = pull.force_time, pull.force, pull.motion
+    # Off the force so far: the sensor's new zeros. Here: inertia, then tool, bias and drift.
+    t, force, motion = pull.force_time, pull.force, pull.motion
     grasp, release = pull.grasp, pull.release
     until = (motion.time >= t[0]) & (motion.time <= release.time)
     if until.sum() < 10:
@@ -149,8 +150,8 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
             " params.yaml (mass 0 for a force without it), or keep the hand's orientation"
         )
     if inertia is not None:
-        raw = raw - inertia.force(motion, pull.geometry, t, release.time)
-    band = band_force(t, raw, motion, pull.geometry, tool, grasp, release)
+        force = force - inertia.force(motion, pull.geometry, t, release.time)
+    band = band_force(t, force, motion, pull.geometry, tool, grasp, release)
 
     window = _window(pull, episode)
     start, period = window.start, window.period

@@ -111,7 +111,7 @@ class BandRecording:
 
 
 @dataclass(frozen=True)
-class Job(BandRecording):
+class VariantJob(BandRecording):
     """One variant's identification by a recording."""
 
     method: str
@@ -167,7 +167,7 @@ def with_first_picture(episode: Episode) -> Episode:
     return replace(episode, clouds=clouds)
 
 
-def identified(job: Job, work: Path, orange: Path | None) -> dict:
+def identified(job: VariantJob, work: Path, orange: Path | None) -> dict:
     """Scores of a variant by one recording."""
     folder = job.recording.episode(work, orange)
     params, method = with_change(job.params, job.method)
@@ -191,7 +191,7 @@ def identified(job: Job, work: Path, orange: Path | None) -> dict:
     }
 
 
-def params_of_rig(job: Job) -> Params:
+def params_of_rig(job: VariantJob) -> Params:
     """What the rig's own processes read: without the variants."""
     return with_rubbers(load(DEFAULTS), SETS[job.group][0], job.number, job.pull)
 
@@ -215,7 +215,7 @@ def against_given(
     }
 
 
-def performed(job: Job, work: Path, orange: Path | None) -> dict:
+def performed(job: VariantJob, work: Path, orange: Path | None) -> dict:
     return result_of(job, partial(identified, job, work, orange))
 
 
@@ -282,7 +282,7 @@ def main() -> int:
         return 0
     work, orange = arguments.work.resolve(), arguments.orange and arguments.orange.resolve()
     results, every = ResultLines(work / "results.jsonl"), recordings(orange)
-    todo = [Job(**asdict(one), method=method) for one in every for method in METHODS]
+    todo = [VariantJob(**asdict(one), method=method) for one in every for method in METHODS]
     limits = arguments.workers, arguments.minutes
     for _ in runner.each(partial(BandRecording.episode, work=work, orange=orange), every, *limits):
         pass

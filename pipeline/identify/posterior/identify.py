@@ -112,7 +112,8 @@ def fit_posterior(
         pass  # the fit says why
     fitted = fit(recordings, coordinates, begin, **options)
     follows = [
-        recording.told_by(it) for recording, it in zip(recordings, fitted.expansions, strict=True)
+        recording.with_wider_tolerances(it)
+        for recording, it in zip(recordings, fitted.expansions, strict=True)
     ]
     if any(
         getattr(wide.tolerances, what) > WIDER * getattr(recording.tolerances, what)

@@ -222,7 +222,7 @@ class Likelihood:
         moved._frames = _that_count(moved.episode)
         return moved
 
-    def told_by(self, expansion: Expansion) -> Likelihood:
+    def with_wider_tolerances(self, expansion: Expansion) -> Likelihood:
         """With force and recoil as sure as the law can follow them, by what a fit left of them."""
         wider = copy(self)
         force = max(self.tolerances.force, expansion.discrepancy)
@@ -294,7 +294,8 @@ class Likelihood:
         moved = np.concatenate([residuals(rollouts) for rollouts in (released, later, led)])
         gap = vectors[0]
         slopes = (vectors[1:] - gap) / steps[:, None]
-        # The recoil shows damping. A law that lacks slow hysteresis would take it for that.
+        # The force tells nothing of the loss factor, the recoil does: a law that lacks slow
+        # hysteresis would take the one for the other.
         slopes[LOSS, : 3 * len(residuals.samples)] = 0.0
         nuisance_slopes = (moved - gap) / NUDGE[:, None]
         return self._eliminated(residuals, gap, slopes, nuisance_slopes, nuisances)

@@ -4,7 +4,8 @@
     cloud   mean offset of the points in a bin along the band from the simulated tube, in two
             components across it: `depth` towards the camera, `side` the other one        [m]
 
-Which samples and pictures count is decided by their time alone, before anything is simulated: the
+Which samples and pictures count is decided by time and by what the camera saw, before anything is
+simulated: the
 force from the grasp to just before the release; pictures of the held band in the last half second
 before it, and of the recoil as long as a picture shows the damping more than the mesh. Bins and
 directions are those of one reference rollout; a bin that shows too few points is none.

@@ -40,6 +40,6 @@ def load_estimate(path: Path) -> dict:
     return read_json(path, EstimateFile).estimate
 
 
-def pull_of(episode: Episode, law: str) -> dict:
+def law_entries(episode: Episode, law: str) -> dict:
     """What a θ file of a law with memory says of the recorded pull; nothing for another law."""
     return {"law": RUBBER, "history": launch_history(episode)} if law == RUBBER else {}

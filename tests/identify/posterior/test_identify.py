@@ -71,7 +71,7 @@ def test_what_moves_a_whole_picture_of_the_recoil_counts_as_one_error(first) -> 
         left[count + bins] = 2e-3 * signs
         found = replace(one, left=left).recoil_discrepancy
         assert found == pytest.approx(2e-3 / gone * repeated, rel=0.25)
-        wider = first.recordings[0].told_by(replace(one, left=left)).tolerances
+        wider = first.recordings[0].with_wider_tolerances(replace(one, left=left)).tolerances
         assert wider.way == max(first.recordings[0].tolerances.way, found)
 
 

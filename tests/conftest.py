@@ -20,10 +20,10 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as stages have it; nothing has impor
 OF_A_USER = {f"{ROOT}/params.yaml", f"{ROOT}/sling2sim2real/params.yaml"}
 
 
-def leave_the_users_file(event: str, about: tuple) -> None:
+def leave_the_users_file(event: str, args: tuple) -> None:
     """The project may be in use: no test may depend on what somebody sets in its params.yaml."""
-    if event == "open" and isinstance(about[0], str) and about[0].endswith("params.yaml"):
-        assert os.path.abspath(about[0]) not in OF_A_USER, "tests take DEFAULTS of tests/project.py"
+    if event == "open" and isinstance(args[0], str) and args[0].endswith("params.yaml"):
+        assert os.path.abspath(args[0]) not in OF_A_USER, "tests take DEFAULTS of tests/project.py"
 
 
 sys.addaudithook(leave_the_users_file)

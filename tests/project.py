@@ -16,8 +16,9 @@ from validation.projects import DEFAULTS, environment, wait
 
 def python(*arguments: str | Path, folder: Path = ROOT, **more: str) -> subprocess.CompletedProcess:
     """Run Python in `folder`, with `more` in its environment."""
-    command, about = [sys.executable, *map(str, arguments)], {"capture_output": True, "text": True}
-    return subprocess.run(command, cwd=folder, env=environment(**more), timeout=240, **about)
+    command = [sys.executable, *map(str, arguments)]
+    options = {"capture_output": True, "text": True}
+    return subprocess.run(command, cwd=folder, env=environment(**more), timeout=240, **options)
 
 
 def set_methods(content: dict, methods: list[str], ablations: list[str] | tuple = ()) -> None:
@@ -47,9 +48,9 @@ def with_(params: Params, section: str, **values: object) -> Params:
 
 def until(happens: Callable[[], object], seconds: float = 90.0):
     """What it gives once that is true; the test fails where it is not after so long."""
-    found = wait(happens, seconds)
-    assert found, f"it did not come to pass within {seconds} s"
-    return found
+    result = wait(happens, seconds)
+    assert result, f"it did not come to pass within {seconds} s"
+    return result
 
 
 def in_use() -> bool:

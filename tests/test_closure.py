@@ -79,13 +79,13 @@ def test_what_a_run_may_leave_empty_is_in_git() -> None:
             and any(str(out).startswith(f"{dep}/") for out in stage["outs"])
         ]
         lists = {str(writer.get("method", writer["band"])) for writer in writers}
-        steps = {one.partition("run.steps.")[2].rstrip("}") for one in lists}
+        steps = {name.partition("run.steps.")[2].rstrip("}") for name in lists}
         if steps != ends and ("" not in steps or lists == {"${run.rig}"}):
             assert (ROOT / dep / ".gitkeep").is_file(), dep
 
 
 def test_every_script_is_a_stage() -> None:
-    scripts = {*(ROOT / "stages").glob("[a-z]*.py")} - {ROOT / one for one in UNTRACKED}
+    scripts = {*(ROOT / "stages").glob("[a-z]*.py")} - {ROOT / path for path in UNTRACKED}
     assert scripts == {script_of(stage) for stage in STAGES.values()}
 
 
@@ -113,8 +113,8 @@ def test_packages_import_each_other_in_one_direction() -> None:
     """Nothing that is called by users imports what proves it, but the developers' commands."""
     for file in code():
         name = relative(file)
-        own = name.partition("/")[0]
-        allowed = {own} | ARROWS[own] | ({"validation"} if name == DEVELOPERS else set())
+        package = name.partition("/")[0]
+        allowed = {package} | ARROWS[package] | ({"validation"} if name == DEVELOPERS else set())
         seen = {relative(other).partition("/")[0] for other in imports(file)}
         assert seen <= allowed, f"{name} imports {min(seen - allowed)}"
     at_once = tree(ROOT / DEVELOPERS).body
@@ -127,9 +127,9 @@ def test_folders_import_each_other_in_one_direction() -> None:
     graph = {}
     for file in code():
         if relative(file).startswith("pipeline/"):
-            own = concern(relative(file))
-            seen = {concern(relative(other)) for other in imports(file)} - {own}
-            graph.setdefault(own, set()).update(seen)
+            folder = concern(relative(file))
+            seen = {concern(relative(other)) for other in imports(file)} - {folder}
+            graph.setdefault(folder, set()).update(seen)
     assert graph["pipeline/base"] == {"pipeline/__init__.py"}
     TopologicalSorter(graph).prepare()  # raises CycleError
 

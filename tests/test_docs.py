@@ -79,11 +79,11 @@ def blocks(language: str, *files: Path) -> list[tuple[Path, str]]:
 def commands(code: str) -> list[list[str]]:
     """The words of each command of a block, without settings of its environment."""
     lines = code.replace("\\\n", " ").splitlines()
-    found = [shlex.split(line, comments=True) for line in lines]
-    for words in found:
+    word_lists = [shlex.split(line, comments=True) for line in lines]
+    for words in word_lists:
         while words and SETTING.fullmatch(words[0]):
             words.pop(0)
-    return [words for words in found if words]
+    return [words for words in word_lists if words]
 
 
 def anchors(page: Path) -> set[str]:
@@ -94,15 +94,17 @@ def anchors(page: Path) -> set[str]:
 
 
 def made_by_a_run(path: Path) -> bool:
-    return any(path.is_relative_to(ROOT / one) for one in IGNORED)
+    return any(path.is_relative_to(ROOT / ignored) for ignored in IGNORED)
 
 
 def test_links_paths_and_anchors_of_every_page_are_there() -> None:
     named, wrong = 0, []
     for page in pages():
         text = page.read_text(encoding="utf-8")
-        links = [(page.parent / one if one else page, head) for one, head in LINK.findall(text)]
-        links += [(ROOT / one, "") for one in CODE.findall(text)]
+        links = [
+            (page.parent / target if target else page, head) for target, head in LINK.findall(text)
+        ]
+        links += [(ROOT / target, "") for target in CODE.findall(text)]
         for path, head in links:
             path, named = path.resolve(), named + 1
             if made_by_a_run(path):
@@ -115,15 +117,15 @@ def test_links_paths_and_anchors_of_every_page_are_there() -> None:
 
 def test_the_glossary_has_each_label_of_a_card() -> None:
     rows = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8").splitlines()
-    for one in QUANTITIES.values():
-        row = re.compile(rf"\| {re.escape(one.label)}( \S+)? \|")
-        assert any(map(row.match, rows)), one.label
+    for quantity in QUANTITIES.values():
+        row = re.compile(rf"\| {re.escape(quantity.label)}( \S+)? \|")
+        assert any(map(row.match, rows)), quantity.label
     assert (ROOT / "reports/bands/band1" / GLOSSARY).resolve() == ROOT / "docs/glossary.md"
 
 
 def test_every_page_is_in_the_index() -> None:
     index = (ROOT / "docs/README.md").read_text(encoding="utf-8")
-    linked = {(ROOT / "docs" / one).resolve() for one, _ in LINK.findall(index)}
+    linked = {(ROOT / "docs" / target).resolve() for target, _ in LINK.findall(index)}
     assert {page for page in written() if page.name != "README.md"} - linked == set()
     notes = {page for page in written() if page.name == "README.md"} - linked
     assert notes == {ROOT / "docs/README.md"}
@@ -139,13 +141,13 @@ def test_pages_tell_of_today_in_short_lines() -> None:
         if len(line) > 130 and not line.startswith("|")
     ]
     assert wide == []
-    found = [
+    matches = [
         (page.name, word)
         for page in written()
         for word in HISTORY
         if re.search(rf"\b{word}\b", " ".join(page.read_text(encoding="utf-8").lower().split()))
     ]
-    assert found == []
+    assert matches == []
 
 
 def test_every_command_is_one() -> None:
@@ -204,8 +206,8 @@ def expect_key(name: str) -> None:
 def test_every_key_is_one() -> None:
     """Of params.yaml, where a page names it with its section: `trials.repeats`."""
     named = {span for page in written() for span in SPAN.findall(page.read_text(encoding="utf-8"))}
-    keys = {one for one in named if re.fullmatch(r"[a-z_]+(\.[a-z_0-9]+)+", one)}
-    keys = {one for one in keys if one.partition(".")[0] in PARAMS and not is_file(one)}
+    keys = {span for span in named if re.fullmatch(r"[a-z_]+(\.[a-z_0-9]+)+", span)}
+    keys = {span for span in keys if span.partition(".")[0] in PARAMS and not is_file(span)}
     assert len(keys) > 40
     for key in sorted(keys):
         expect_key(key)
@@ -221,7 +223,7 @@ def test_every_option_is_one() -> None:
     subs = next(
         action for action in parser()._actions if action.choices and "check" in action.choices
     ).choices
-    found = 0
+    count = 0
     for page in written():
         for span in SPAN.findall(page.read_text(encoding="utf-8")):
             words = span.split()
@@ -230,8 +232,8 @@ def test_every_option_is_one() -> None:
             assert words[1] in subs, f"{page.name}: {span}"
             flags = {word.partition("=")[0].strip("[]") for word in words if word.startswith("--")}
             assert flags <= set(subs[words[1]]._option_string_actions), f"{page.name}: {span}"
-            found += 1
-    assert found > 20
+            count += 1
+    assert count > 20
 
 
 def test_python_imports_what_there_is() -> None:
@@ -239,8 +241,8 @@ def test_python_imports_what_there_is() -> None:
     for page, code in blocks("python"):
         for node in ast.walk(ast.parse(code)):
             for module, name in imported(node):
-                found = importlib.import_module(module)
-                assert not name or hasattr(found, name), f"{page.name}: {module}.{name}"
+                package = importlib.import_module(module)
+                assert not name or hasattr(package, name), f"{page.name}: {module}.{name}"
 
 
 def imported(node: ast.AST) -> list[tuple[str, str]]:
@@ -292,7 +294,7 @@ def test_readme_has_the_results_of_the_report() -> None:
         row = next(line for line in readme.splitlines() if re.match(rf"\| {name}\b", line))
         cells = row.removesuffix(" |").split(" | ")[1:]
         assert cells == [f"{number:.1f} cm" for number in numbers], name
-    plain, dip = (f"{one[0]} of {one[1]}" for one in inside.values())
+    plain, dip = (f"{pair[0]} of {pair[1]}" for pair in inside.values())
     assert f"{dip} landed inside their 90 % intervals, and {plain} by the paper's pull" in readme
 
 

@@ -79,13 +79,13 @@ def normal(name: str) -> str:
 def declared(extra: str = "") -> set[str]:
     """Distributions of an extra, and of the extras in it; of everybody's by default."""
     lines = PROJECT["optional-dependencies"][extra] if extra else PROJECT["dependencies"]
-    found = set()
+    names = set()
     for line in map(Requirement, lines):
         if line.name == PROJECT["name"]:
-            found |= set().union(*map(declared, line.extras))
+            names |= set().union(*map(declared, line.extras))
         else:
-            found.add(normal(line.name))
-    return found
+            names.add(normal(line.name))
+    return names
 
 
 def imported(file: Path) -> Iterator[str]:
@@ -108,7 +108,7 @@ PACKAGES = packages_distributions()
 
 def distributions(package: str) -> set[str]:
     """Any of which may be declared for a package; one that is not installed bears its name."""
-    return {normal(one) for one in PACKAGES.get(package, [package])} | INSTALLED_AS.get(
+    return {normal(name) for name in PACKAGES.get(package, [package])} | INSTALLED_AS.get(
         package, set()
     )
 
@@ -121,11 +121,11 @@ def test_what_is_imported_is_declared_for_who_imports_it() -> None:
         if name.startswith(ELSEWHERE):
             continue
         paths = sorted((path for path in EXTRAS if name.startswith(path)), key=len)
-        known = everybody.union(*(declared(EXTRAS[path]) for path in paths))
+        allowed = everybody.union(*(declared(EXTRAS[path]) for path in paths))
         for package in imported(file):
-            found = distributions(package)
-            used |= found
-            assert found & known, f"{name} imports {package}: declare {sorted(found)}"
+            candidates = distributions(package)
+            used |= candidates
+            assert candidates & allowed, f"{name} imports {package}: declare {sorted(candidates)}"
     extras = set().union(*map(declared, PROJECT["optional-dependencies"]))
     idle = (everybody | extras) - used - INDIRECT.keys()
     assert not idle, "declared, and imported by nobody"
@@ -161,7 +161,7 @@ def light(folder: Path, *words: str) -> subprocess.CompletedProcess:
 
 
 def test_a_light_install_suffices_and_says_what_it_lacks(tmp_path: Path) -> None:
-    brought = {name for one in OF_THE_EXTRA for name in distributions(one)}
+    brought = {name for package in OF_THE_EXTRA for name in distributions(package)}
     assert declared("run") <= brought
     assert not declared() & brought
     how = "make setup, or pip install '.[run]' -c constraints.txt in the project's folder"

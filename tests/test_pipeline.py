@@ -24,9 +24,9 @@ SEARCH = {OURS: ["history", "density"], PAPER: ["history", "clusters", "cma"], "
 
 def of_method(method: str, first: str = "", band: str = "band1") -> set[str]:
     """Stages of a method, from one step on."""
-    own = band == OWN
-    kind = "own_" if own else "" if method in METHODS else "ablation_"
-    steps = [*SEARCH[method], "theta", "policy", *([] if own else ["launches"]), "trials"]
+    is_own = band == OWN
+    kind = "own_" if is_own else "" if method in METHODS else "ablation_"
+    steps = [*SEARCH[method], "theta", "policy", *([] if is_own else ["launches"]), "trials"]
     return {f"{kind}{step}@{band}-{method}" for step in steps[steps.index(first or steps[0]) :]}
 
 
@@ -69,12 +69,12 @@ class Copy(ProjectCopy):
 
     def status(self) -> dict[str, list[str]]:
         """Stages whose own inputs have changed since they ran: keys, files and folders."""
-        found = {}
+        changed = {}
         for stage, changes in json.loads(self("dvc", "status", "--json")).items():
             deps = [change["changed deps"] for change in changes]
             keys = [key for dep in deps for key in dep.pop("params.yaml", ())]
-            found[stage] = [*keys, *(path for dep in deps for path in dep)]
-        return found
+            changed[stage] = [*keys, *(path for dep in deps for path in dep)]
+        return changed
 
     @cached_property
     def stages(self) -> list[Stage]:
@@ -83,11 +83,11 @@ class Copy(ProjectCopy):
 
     def after(self, names: Collection[str]) -> set[str]:
         """Stages that read what these make, and so on."""
-        found: set[str] = set()
+        dependents: set[str] = set()
         for stage in self.stages:
-            if {*stage.producers} & {*names, *found}:
-                found.add(stage.name)
-        return found
+            if {*stage.producers} & {*names, *dependents}:
+                dependents.add(stage.name)
+        return dependents
 
 
 @pytest.fixture(scope="module")
@@ -96,9 +96,9 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Copy:
     copy = Copy(tmp_path_factory.mktemp("project") / "copy")
     recorded = of_band("record")
     assert copy.dvc("repro", *recorded) == recorded
-    own = copy.folder / f"data/raw/{OWN}/{OWN}.mcap"
-    own.parent.mkdir()
-    shutil.copy(copy.folder / "data/raw/band1/band1.mcap", own)
+    recording = copy.folder / f"data/raw/{OWN}/{OWN}.mcap"
+    recording.parent.mkdir()
+    shutil.copy(copy.folder / "data/raw/band1/band1.mcap", recording)
     assert copy.dvc("repro") == EVERYTHING - recorded
     return copy
 
@@ -140,12 +140,12 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
         notes = list((project.folder.parent / "audit").glob(f"{script}.*.json"))
         assert notes, f"{name} left no note of what it read"
         read = {key for note in notes for key in json.loads(note.read_text())}
-        unlisted = [key for key in read if not any(covers(one, key) for one in listed)]
+        unlisted = [key for key in read if not any(covers(prefix, key) for prefix in listed)]
         assert not unlisted, f"{name} reads parameters that dvc.yaml does not list"
         unread = {
             key.replace(method or " ", "${item.method}")
             for key in listed
-            if not any(covers(key, one) for one in read)
+            if not any(covers(key, read_key) for read_key in read)
         }
         unread -= {"setup.clamp_direction"} if method else OF_OTHER_RECORDINGS  # without mounting
         if method not in ("de", "bo"):  # methods share a list: what none of them reads is idle
@@ -346,10 +346,10 @@ def reasons(project: Copy) -> dict[str, list[str]]:
     before = {file: file.read_bytes() for file in files if file.exists()}
     for change in CHANGES.values():
         change.make(project)
-    found = project.status()
+    status = project.status()
     for file in files:
         file.write_bytes(before[file]) if file in before else file.unlink()
-    return found
+    return status
 
 
 @pytest.mark.parametrize("name", CHANGES)
@@ -358,7 +358,7 @@ def test_a_change_makes_stale_what_depends_on_it(
 ) -> None:
     """At once what reads what has changed, then what may run after that, by DVC's graph."""
     change = CHANGES[name]
-    at_once = {stage for stage, known in reasons.items() if change.makes_stale(known)}
+    at_once = {stage for stage, changes in reasons.items() if change.makes_stale(changes)}
     assert at_once == change.at_once
     assert project.after(at_once) - at_once == change.then
 

@@ -48,17 +48,17 @@ def test_a_run_that_fails_keeps_its_time_and_another_command_begins_anew(tmp_pat
 
 def leaves(node: dict, *path: str) -> dict[tuple, object]:
     """Values by their keys' paths; a list is one value."""
-    found = {}
+    values = {}
     for key, value in node.items():
-        found |= leaves(value, *path, key) if isinstance(value, dict) else {(*path, key): value}
-    return found
+        values |= leaves(value, *path, key) if isinstance(value, dict) else {(*path, key): value}
+    return values
 
 
 def notes(text: str) -> list[str]:
     return [line.partition("#")[2] for line in text.splitlines() if "#" in line]
 
 
-@pytest.mark.parametrize("name", sorted(one.stem for one in PRESETS.glob("*.yaml")))
+@pytest.mark.parametrize("name", sorted(path.stem for path in PRESETS.glob("*.yaml")))
 def test_a_presets_keys_are_all_that_changes(name: str, tmp_path: Path) -> None:
     before, path = DEFAULTS.read_text(encoding="utf-8"), tmp_path / "params.yaml"
     path.write_text(before, encoding="utf-8")
@@ -84,8 +84,10 @@ def test_the_papers_preset_has_no_method_of_ours_and_searches_the_whole_box(tmp_
     write_preset(path, preset("paper"))
     params = load(path)
     run = [params.methods[name] for name in (*params.run.methods, *params.run.ablations.methods)]
-    assert not any(one.mounting for one in run)
-    assert {one.law for one in run} == {"neo_hookean"} and not any(one.bounds for one in run)
+    assert not any(method.mounting for method in run)
+    assert {method.law for method in run} == {"neo_hookean"} and not any(
+        method.bounds for method in run
+    )
     assert not params.methods["sling2sim2real"].fixed
 
 

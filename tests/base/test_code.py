@@ -35,7 +35,7 @@ def test_digests_are_of_what_is_imported_and_follow_its_changes(tmp_path: Path) 
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(FILES.get(name, "") + "# more\n")
         now = digests(script, root=tmp_path)
-        assert {one for one in now if now[one] != before[one]} == {part}
+        assert {source for source in now if now[source] != before[source]} == {part}
         before = now
     (tmp_path / "pipeline/other/new.py").touch()
     (tmp_path / "validation/bench/b.py").write_text("# another script\n")

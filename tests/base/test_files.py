@@ -18,7 +18,7 @@ def test_a_failure_leaves_what_was_there(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError), replacing(file) as temporary:
         temporary.write_text("half")
         raise RuntimeError
-    assert [one.name for one in tmp_path.iterdir()] == ["a.txt"] and file.read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"] and file.read_text() == "old"
 
 
 def test_a_folder_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -27,15 +27,15 @@ def test_a_folder_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
         with replacing_folder(folder) as temporary:
             for name in names:
                 (temporary / name).write_text(name)
-        assert sorted(one.name for one in folder.iterdir()) == list(names)
+        assert sorted(path.name for path in folder.iterdir()) == list(names)
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
     (tmp_path / f".a.{dead.pid}.tmp").mkdir()
     with pytest.raises(RuntimeError), replacing_folder(folder) as temporary:
         (temporary / "3").write_text("half")
         raise RuntimeError
-    assert [one.name for one in folder.iterdir()] == ["1"]
-    assert [one.name for one in tmp_path.iterdir()] == ["a"]
+    assert [path.name for path in folder.iterdir()] == ["1"]
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
 def test_a_file_is_on_the_disk_before_it_bears_its_name(tmp_path, monkeypatch) -> None:
@@ -44,8 +44,8 @@ def test_a_file_is_on_the_disk_before_it_bears_its_name(tmp_path, monkeypatch) -
     target = tmp_path / "a"
 
     def noting(number: int) -> None:
-        about = os.fstat(number)
-        synced.append((about.st_ino, None if os.path.isdir(number) else about.st_size, present()))
+        status = os.fstat(number)
+        synced.append((status.st_ino, None if os.path.isdir(number) else status.st_size, present()))
         sync(number)
 
     monkeypatch.setattr(os, "fsync", noting)
@@ -114,5 +114,5 @@ def test_only_what_the_dead_left_is_removed(tmp_path: Path) -> None:
     for name in names.values():
         (tmp_path / name).touch()
     write_text(tmp_path / "a[1].txt", "new")
-    left = {one.name for one in tmp_path.iterdir()}
+    left = {path.name for path in tmp_path.iterdir()}
     assert left == {"a[1].txt", names["alive"], names["other"], names["longer"]}

@@ -36,9 +36,10 @@ def settled(tmp_path: Path, *how: str, **more: str) -> dict[str, str | None]:
 
 
 def test_who_has_a_home_keeps_it(tmp_path: Path) -> None:
-    found = settled(tmp_path, HOME=str(tmp_path), USER="me", DVC_SITE_CACHE_DIR=str(tmp_path))
-    assert found["HOME"] == found["DVC_SITE_CACHE_DIR"] == str(tmp_path)
-    assert (found["USER"], found["XDG_CACHE_HOME"], found["MPLCONFIGDIR"]) == ("me", None, None)
+    settings = settled(tmp_path, HOME=str(tmp_path), USER="me", DVC_SITE_CACHE_DIR=str(tmp_path))
+    assert settings["HOME"] == settings["DVC_SITE_CACHE_DIR"] == str(tmp_path)
+    assert settings["USER"] == "me"
+    assert settings["XDG_CACHE_HOME"] is settings["MPLCONFIGDIR"] is None
 
 
 @pytest.mark.parametrize("home", ["", "/proc", "/nonexistent/of/nobody"])
@@ -46,15 +47,15 @@ def test_who_has_none_gets_a_folder_of_his_own(tmp_path: Path, home: str) -> Non
     """Not in the project where that may not be written, and never one that is called `~`."""
     if home == "/nonexistent/of/nobody" and Path("/").stat().st_uid == 0:
         home = "/proc/nonexistent"  # root may write to /
-    found = settled(tmp_path, "--no-name", "--no-project", HOME=home)
-    (own,) = tmp_path.glob("sling2sim2real-*")
-    assert own.stat().st_mode & 0o777 == 0o700
-    assert found["USER"] and found["USER"].isdigit()
+    settings = settled(tmp_path, "--no-name", "--no-project", HOME=home)
+    (folder,) = tmp_path.glob("sling2sim2real-*")
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert settings["USER"] and settings["USER"].isdigit()
     if home:
-        assert found["XDG_CACHE_HOME"] == str(own)
-        assert found["MPLCONFIGDIR"] == str(own / "matplotlib")
+        assert settings["XDG_CACHE_HOME"] == str(folder)
+        assert settings["MPLCONFIGDIR"] == str(folder / "matplotlib")
     else:
-        assert found["HOME"] == str(own)
+        assert settings["HOME"] == str(folder)
 
 
 def test_a_full_disk_is_no_home_either(tmp_path: Path, monkeypatch) -> None:
@@ -70,10 +71,10 @@ def test_a_full_disk_is_no_home_either(tmp_path: Path, monkeypatch) -> None:
 
 
 def test_a_folder_of_that_name_that_others_may_read_is_not_taken(tmp_path: Path) -> None:
-    found = settled(tmp_path, "--no-name", "--no-project")
-    Path(found["HOME"]).chmod(0o777)
+    settings = settled(tmp_path, "--no-name", "--no-project")
+    Path(settings["HOME"]).chmod(0o777)
     other = settled(tmp_path, "--no-name", "--no-project")
-    assert other["HOME"] != found["HOME"] and Path(other["HOME"]).parent == tmp_path
+    assert other["HOME"] != settings["HOME"] and Path(other["HOME"]).parent == tmp_path
 
 
 def test_where_nothing_can_be_written_one_line_says_so(tmp_path: Path) -> None:

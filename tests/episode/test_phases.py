@@ -38,8 +38,8 @@ def recoil(y) -> dict:
     return {"clouds": clouds, "cloud_time": RELEASE + 0.02 * np.arange(len(y))}
 
 
-def kinds(found: list[InteractionPhase]) -> list[str]:
-    return [one.kind for one in found]
+def kinds(sequence: list[InteractionPhase]) -> list[str]:
+    return [phase.kind for phase in sequence]
 
 
 def test_the_force_rises_beyond_the_bands_weight() -> None:
@@ -48,9 +48,11 @@ def test_the_force_rises_beyond_the_bands_weight() -> None:
 
 
 def test_a_recoil_ends_as_the_band_passes_the_fork() -> None:
-    found = phases(pull(**recoil([-0.4, -0.3, -0.1, 0.02, 0.1, -0.05])))
-    assert kinds(found)[-2:] == ["recoil", "swing"]
-    np.testing.assert_allclose([found[-2].begin, found[-2].end, found[-1].end], [2.4, 2.46, 3.6])
+    sequence = phases(pull(**recoil([-0.4, -0.3, -0.1, 0.02, 0.1, -0.05])))
+    assert kinds(sequence)[-2:] == ["recoil", "swing"]
+    np.testing.assert_allclose(
+        [sequence[-2].begin, sequence[-2].end, sequence[-1].end], [2.4, 2.46, 3.6]
+    )
 
 
 def test_a_recoil_that_no_frame_ends() -> None:
@@ -97,8 +99,8 @@ def test_times_ways_and_speeds_of_a_dip() -> None:
     assert loading.start == pytest.approx(led.TAUT, abs=0.03)
     np.testing.assert_allclose([loading.stop, again.stop, pause.stop], 0.4, atol=2e-3)
     assert back.stop == again.start == pytest.approx(0.3, abs=2e-3)
-    for found, begin in ((back, 5.2), (again, 6.2), (pause, 7.2)):
-        assert found.begin == pytest.approx(begin, abs=0.12)
+    for phase, begin in ((back, 5.2), (again, 6.2), (pause, 7.2)):
+        assert phase.begin == pytest.approx(begin, abs=0.12)
     assert back.speed == pytest.approx(0.1, rel=0.15)
     assert pause.end == 9.2
 
@@ -109,11 +111,11 @@ def test_times_ways_and_speeds_of_a_dip() -> None:
 def test_any_dip_of_two_centimetres_is_seen(depth, out, back, pause) -> None:
     low, again = 4.2 + out, 4.2 + out + back
     knots = ((1.2, 0.0), (4.2, 0.4), (low, 0.4 - depth), (again, 0.4), (again + pause, 0.4))
-    found = phases_of_hand(led.episode(knots, 2e-4, 0.001))
-    (unloading,) = [one for one in found if one.kind == "unloading"]
+    sequence = phases_of_hand(led.episode(knots, 2e-4, 0.001))
+    (unloading,) = [phase for phase in sequence if phase.kind == "unloading"]
     assert unloading.way == pytest.approx(depth, abs=4e-3)
-    ends = [one.begin for one in found[1:]]
-    assert ends == pytest.approx([one.end for one in found[:-1]])  # no gap, no overlap
+    ends = [phase.begin for phase in sequence[1:]]
+    assert ends == pytest.approx([phase.end for phase in sequence[:-1]])  # no gap, no overlap
 
 
 def test_what_a_recording_does_not_show() -> None:
@@ -133,6 +135,6 @@ def test_turns_are_those_of_a_zigzag(steps, seed) -> None:
     ends = np.concatenate([[0], np.cumsum(np.array(steps) * (-1.0) ** np.arange(len(steps)))])
     way = np.interp(np.arange(0, len(steps) + 1e-9, 0.02), np.arange(len(ends)), ends)
     way += np.random.default_rng(seed).uniform(-1e-3, 1e-3, len(way))
-    found = turns(way)
-    assert len(found) == len(ends)
-    np.testing.assert_allclose(way[found], ends, atol=2e-3)
+    indices = turns(way)
+    assert len(indices) == len(ends)
+    np.testing.assert_allclose(way[indices], ends, atol=2e-3)

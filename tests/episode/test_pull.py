@@ -22,8 +22,8 @@ def test_a_pull_that_never_turns_is_as_ever(noise) -> None:
     stop = ((1.2, 0.0), (3, 0.3), (4, 0.3), (6, 0.4), (7, 0.4))
     for knots in (led.MONOTONE, stop):
         episode = led.episode(knots, noise)
-        found = launch_history(episode)
-        assert (found["pull_time"], found["pause"]) == before(episode)
+        history = launch_history(episode)
+        assert (history["pull_time"], history["pause"]) == before(episode)
 
 
 @pytest.mark.parametrize(
@@ -38,10 +38,10 @@ def test_a_pull_that_never_turns_is_as_ever(noise) -> None:
     ],
 )
 def test_dips_and_cycles(knots, pull_time, pause) -> None:
-    found = launch_history(led.episode(knots, 2e-4))
-    assert found["pull_time"] == pytest.approx(pull_time, rel=0.1)
-    assert found["pause"] == pytest.approx(pause, abs=0.1)
-    assert found["deepest"] == pytest.approx(0.4, abs=2e-3)
+    history = launch_history(led.episode(knots, 2e-4))
+    assert history["pull_time"] == pytest.approx(pull_time, rel=0.1)
+    assert history["pause"] == pytest.approx(pause, abs=0.1)
+    assert history["deepest"] == pytest.approx(0.4, abs=2e-3)
 
 
 def test_the_deepest_draw_is_of_any_time() -> None:

@@ -35,11 +35,11 @@ def message(copy: Path, tmp_path: Path):
 
 
 def numbers(pattern: str, text: str) -> list[float]:
-    return [float(one) for one in re.findall(pattern, text)]
+    return [float(number) for number in re.findall(pattern, text)]
 
 
 def test_every_script_is_run_and_short() -> None:
-    scripts = {one.stem: one.read_text() for one in (ROOT / "examples").glob("*.py")}
+    scripts = {script.stem: script.read_text() for script in (ROOT / "examples").glob("*.py")}
     assert scripts.keys() == RUN_HERE | RUN_ELSEWHERE
     for name, text in scripts.items():
         assert len(text.splitlines()) <= 60, name
@@ -57,8 +57,8 @@ def test_simulate_pull(message) -> None:
 def test_identify_from_arrays(message) -> None:
     text = message("identify_from_arrays")
     assert "\nsettled\n" in text
-    found = r"mooney_share: ([-\d.]+)  \[[-\d.]+, [-\d.]+\], truth 0.3"
-    assert numbers(found, text)[0] == pytest.approx(0.3, abs=0.1)
+    pattern = r"mooney_share: ([-\d.]+)  \[[-\d.]+, [-\d.]+\], truth 0.3"
+    assert numbers(pattern, text)[0] == pytest.approx(0.3, abs=0.1)
     assert "it lands at 2.00 m" in text
 
 
@@ -66,7 +66,7 @@ def test_identify_from_arrays(message) -> None:
 def test_own_optimizer(message) -> None:
     text = message("own_optimizer")
     stiffness = numbers(r"youngs_modulus +([\d.e+]+)", text)
-    assert len(stiffness) == 2 and all(abs(one / 2.2e5 - 1) < 0.15 for one in stiffness)
+    assert len(stiffness) == 2 and all(abs(modulus / 2.2e5 - 1) < 0.15 for modulus in stiffness)
 
 
 @pytest.mark.slow

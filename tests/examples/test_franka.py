@@ -30,10 +30,10 @@ DRAW = (-0.32, -0.05)
 def module(name: str, file: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec and spec.loader
-    found = importlib.util.module_from_spec(spec)
-    sys.modules[name] = found  # dataclasses look there
-    spec.loader.exec_module(found)
-    return found
+    script = importlib.util.module_from_spec(spec)
+    sys.modules[name] = script  # dataclasses look there
+    spec.loader.exec_module(script)
+    return script
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ class FakeFranka:
         self.Robot = lambda host, realtime_config: robot
         self.Gripper = lambda host: hand
         self.Affine = lambda place, turn: (place, turn)
-        self.RobotPose = self.CartesianState = self.CartesianWaypoint = lambda one: one
+        self.RobotPose = self.CartesianState = self.CartesianWaypoint = lambda pose: pose
         self.CartesianWaypointMotion = lambda ways: ways[0]
         self.JointMotion = lambda joints: ("joints", *joints)
 
@@ -99,21 +99,21 @@ def test_the_fake_is_told_the_plan(execute, planned, monkeypatch) -> None:
     folder, plan = planned
     fake = FakeFranka()
     assert run(execute, monkeypatch, fake, folder) == 0
-    moves = [one[1] for one in fake.summary if one[0] == "move"]
+    moves = [call[1] for call in fake.summary if call[0] == "move"]
     assert moves[0][0] == "joints"
     rows = plan.rows()
     ways = [row for row in rows if row["max_speed_m_s"] > 0]
     for (place, turn), row in zip(moves[2:], ways, strict=True):
         np.testing.assert_allclose(place, row["base"], atol=2e-4)  # of a sample after it
         np.testing.assert_allclose(turn, plan.hand, atol=1e-6)
-    fingers = [one for one in fake.summary if one[0] in ("open", "grasp")]
+    fingers = [call for call in fake.summary if call[0] in ("open", "grasp")]
     assert [finger[:2] for finger in fingers] == [
         ("open", 0.08),  # before it begins
         ("grasp", 0.0),
         ("open", 0.08),
     ]
     assert fingers[1][3] == plan.grip_force
-    limits = [one[1] for one in fake.summary if one[0] == "limit"]
+    limits = [call[1] for call in fake.summary if call[0] == "limit"]
     assert max(limits[::2]) <= max(row["max_speed_m_s"] for row in rows) + 1e-9
 
 
@@ -181,7 +181,7 @@ def test_it_stops_where_the_fingers_or_a_joint_fail(execute, planned, monkeypatc
     ):
         assert run(execute, monkeypatch, fake, planned[0]) == 1
         assert words in capsys.readouterr().err
-        assert not [one for one in fake.summary if one[0] == "open"][1:]
+        assert not [call for call in fake.summary if call[0] == "open"][1:]
 
 
 def test_the_launch_file_records_what_the_docs_say(monkeypatch) -> None:
@@ -194,16 +194,16 @@ def test_the_launch_file_records_what_the_docs_say(monkeypatch) -> None:
         ),
         "launch.substitutions": SimpleNamespace(LaunchConfiguration=lambda name: f"${name}"),
     }
-    for name, one in fake.items():
-        monkeypatch.setitem(sys.modules, name, one)
+    for name, stand_in in fake.items():
+        monkeypatch.setitem(sys.modules, name, stand_in)
     file = module("franka_record", FOLDER / "record.launch.py")
     *given, command = file.generate_launch_description()
     defaults = {f"${name}": value for name, value in given}
     line = " ".join(defaults.get(word, word) for word in command)
     page = " ".join((ROOT / "docs/recording.md").read_text().replace("\\\n", " ").split())
     assert line in page
-    known = get_typestore(Stores.ROS2_HUMBLE).types
-    assert set(file.TOPICS.values()) <= set(known)
+    message_types = get_typestore(Stores.ROS2_HUMBLE).types
+    assert set(file.TOPICS.values()) <= set(message_types)
 
 
 @pytest.mark.slow

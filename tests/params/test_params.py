@@ -92,7 +92,7 @@ def test_no_model_has_a_default() -> None:
     """What a run depends on stands in params.yaml alone: the models are no stage's dependency."""
 
     def models(base: type) -> list[type]:
-        return [base, *(one for sub in base.__subclasses__() for one in models(sub))]
+        return [base, *(subclass for sub in base.__subclasses__() for subclass in models(sub))]
 
     ours = [model for model in models(Section) if model.__module__.startswith("pipeline.params")]
     assert len(ours) > 30
@@ -244,9 +244,9 @@ def test_bands_of_ones_own_are_recorded_and_have_a_list() -> None:
 
 def test_what_a_method_leaves_out_is_as_the_defaults_say() -> None:
     weights = CONTENT["methods"]["de"]["weights"]
-    about = check(stepped(changed(("methods", "de"), {"weights": weights}))).methods["de"]
-    assert (about.search, about.k_top, about.covariance) == ("multistart", None, True)
-    assert (about.settings, about.fixed, about.bounds) == ({}, {}, {})
+    method = check(stepped(changed(("methods", "de"), {"weights": weights}))).methods["de"]
+    assert (method.search, method.k_top, method.covariance) == ("multistart", None, True)
+    assert (method.settings, method.fixed, method.bounds) == ({}, {}, {})
     other = check(changed(("method_defaults", "bounds"), {"poissons_ratio": [0.4, 0.49]})).methods
     assert other["no_work"].bounds == {"poissons_ratio": (0.4, 0.49)}
     assert set(other["least_squares"].bounds) == {*LAWS["rubber"]}
@@ -285,8 +285,8 @@ def test_a_methods_regions_need_rollouts() -> None:
 
 def test_what_a_method_may_ask_for() -> None:
     base = CONTENT["methods"]["de"]
-    own = {"search": "lab.search:Own", "settings": {"rate": 0.1, "steps": 3, "name": "x"}}
-    whole = stepped(changed(("methods", "de"), base | own))
+    section = {"search": "lab.search:Own", "settings": {"rate": 0.1, "steps": 3, "name": "x"}}
+    whole = stepped(changed(("methods", "de"), base | section))
     assert check(whole).methods["de"].settings["rate"] == 0.1
     rubber = {"law": "rubber", "bounds": CONTENT["methods"]["least_squares"]["bounds"]}
     rubber |= {"fixed": ALL_FIXED | {"softening": 0.0}}  # the rest of what the law adds is left
@@ -356,6 +356,6 @@ def test_any_damaged_text_is_accepted_or_refused_in_one_line(data: st.DataObject
 def test_names_with_control_characters_or_markup_are_refused_in_one_printable_line() -> None:
     """A prompt and a topic may be any text; what shows them cares for itself."""
     for place in (("bands",), ("methods",), ("setup",), ("setup", "topics")):
-        value = next(one for path, one in leaves(CONTENT) if path[: len(place)] == place)
+        value = next(leaf for path, leaf in leaves(CONTENT) if path[: len(place)] == place)
         for name in ("x\x1b[2J", "<script>", "../x", "a\nb", "$x$"):
             assert refusal(changed((*place, name), value)).isprintable()

@@ -18,21 +18,21 @@ BAND, METHOD = "band1", "least_squares"
 
 
 def test_settings_are_values_by_their_keys_and_survive_json(params) -> None:
-    found = settings_of(params, BAND, METHOD)
-    assert found["setup.fork_width"] == 0.275 and found["bands.band1.mass"] == 0.023
-    assert found["methods.least_squares.law"] == params.methods[METHOD].law
-    for settings in (found, policy_settings_of(params, BAND)):
+    values = settings_of(params, BAND, METHOD)
+    assert values["setup.fork_width"] == 0.275 and values["bands.band1.mass"] == 0.023
+    assert values["methods.least_squares.law"] == params.methods[METHOD].law
+    for settings in (values, policy_settings_of(params, BAND)):
         assert changes(json.loads(json.dumps(settings)), settings) == []
 
 
 def test_changes_name_what_came_went_and_is_another(params) -> None:
-    found = changes({"a": 1, "b": None, "c": 0}, {"b": 2.0, "c": 0, "d": 3})
-    assert [*map(str, found)] == [
+    differences = changes({"a": 1, "b": None, "c": 0}, {"b": 2.0, "c": 0, "d": 3})
+    assert [*map(str, differences)] == [
         "a was 1, is not there",
         "b was null, is 2.0",
         "d was not there, is 3",
     ]
-    assert found[1] == Change("b", None, 2.0)
+    assert differences[1] == Change("b", None, 2.0)
 
 
 def test_launches_as_evidence_bring_their_settings(params) -> None:
@@ -52,5 +52,5 @@ def test_dvc_runs_a_stage_again_when_what_it_notes_has_changed(params, step: str
         settings_of(params, BAND, METHOD) if step == "theta" else policy_settings_of(params, BAND)
     )
     assert [
-        key for key in noted if not any(f"{key}.".startswith(f"{one}.") for one in listed)
+        key for key in noted if not any(f"{key}.".startswith(f"{prefix}.") for prefix in listed)
     ] == []

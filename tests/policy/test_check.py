@@ -24,13 +24,13 @@ TRAINED = SimpleNamespace(
 def test_it_launches_the_draws_themselves(trained) -> None:
     targets = np.linspace(1.425, 2.425, 256)
     truth = np.abs(toy.launch(trained.policy.draws(targets)).landing_y - targets)
-    found = check(trained.policy, toy.launch, params())
-    assert found == PolicyCheck(pytest.approx(truth.mean()), pytest.approx(truth.max()), {})
-    summary = figures(trained, found)
+    result = check(trained.policy, toy.launch, params())
+    assert result == PolicyCheck(pytest.approx(truth.mean()), pytest.approx(truth.max()), {})
+    summary = figures(trained, result)
     assert summary["converged"] and summary["mean_error_m"] <= CONVERGED
     assert summary["map_mean_error_m"] == trained.mean_error != summary["mean_error_m"]
-    assert verdict(summary, found.failures).startswith("converged, mean |y_p - g| 0.")
-    assert figures(trained, found, "simulated")["map_mean_error_m"] is None
+    assert verdict(summary, result.failures).startswith("converged, mean |y_p - g| 0.")
+    assert figures(trained, result, "simulated")["map_mean_error_m"] is None
 
 
 def test_a_launch_off_the_map_is_no_convergence(trained) -> None:
@@ -41,11 +41,11 @@ def test_a_launch_off_the_map_is_no_convergence(trained) -> None:
         launched.landing_y = launched.landing_y + 0.03
         return launched
 
-    found = check(trained.policy, further, params())
-    summary = figures(trained, found)
+    result = check(trained.policy, further, params())
+    summary = figures(trained, result)
     assert not summary["converged"] and summary["map_mean_error_m"] < CONVERGED
     assert summary["mean_error_m"] == pytest.approx(0.03, abs=0.005)
-    assert verdict(summary, found.failures).startswith("NOT converged, mean |y_p - g| ")
+    assert verdict(summary, result.failures).startswith("NOT converged, mean |y_p - g| ")
 
 
 def test_failures_are_counted_by_reason_and_forbid_convergence(trained) -> None:
@@ -57,12 +57,12 @@ def test_failures_are_counted_by_reason_and_forbid_convergence(trained) -> None:
     weak = params(
         max_force=np.sort(toy.launch(trained.policy.draws(np.array([2.4]))).hold_force)[0]
     )
-    found = check(trained.policy, broken, weak)
-    assert found.failures["it broke"] == 5 and 1 <= found.failures[TOO_MUCH_FORCE] < 50
-    summary = figures(trained, found)
-    assert summary["failed_targets"] == sum(found.failures.values())
+    result = check(trained.policy, broken, weak)
+    assert result.failures["it broke"] == 5 and 1 <= result.failures[TOO_MUCH_FORCE] < 50
+    summary = figures(trained, result)
+    assert summary["failed_targets"] == sum(result.failures.values())
     assert summary["mean_error_m"] < CONVERGED and not summary["converged"]
-    assert "it broke 5" in verdict(summary, found.failures)
+    assert "it broke 5" in verdict(summary, result.failures)
 
 
 def test_where_nothing_lands_there_is_no_error() -> None:

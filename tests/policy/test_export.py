@@ -69,7 +69,7 @@ def test_a_policy_that_sees_the_projectile_agrees_too(seeing, tmp_path) -> None:
     random = np.random.default_rng(1)
     places = random.uniform((-0.2, -0.3), (0.1, -0.1), (1000, 2)).astype(np.float32)
     given = {"projectile": places, "target": TARGETS}
-    tensors = [torch.from_numpy(one) for one in given.values()]
+    tensors = [torch.from_numpy(array) for array in given.values()]
     with torch.inference_mode():
         network = seeing.policy(*tensors).numpy()
         script = torch.jit.load(stored.folder / "policy.pt")(*tensors).numpy()

@@ -51,9 +51,9 @@ def short(settings, **changes) -> SimpleNamespace:
     return SimpleNamespace(**{**vars(settings), "iterations": 2, "envs": 64, **changes})
 
 
-def same(one: Trained, other: Trained) -> bool:
-    pairs = zip(one.policy.parameters(), other.policy.parameters(), strict=True)
-    return one.curve == other.curve and all(torch.equal(a, b) for a, b in pairs)
+def same(first: Trained, second: Trained) -> bool:
+    pairs = zip(first.policy.parameters(), second.policy.parameters(), strict=True)
+    return first.curve == second.curve and all(torch.equal(a, b) for a, b in pairs)
 
 
 def test_the_same_settings_give_the_same_training_and_each_counts(toy_map, settings) -> None:
@@ -94,11 +94,11 @@ def test_on_simulated_launches_it_hits_without_a_map(toy_map, settings) -> None:
 def test_simulated_launches_give_the_same_training_again_and_another_than_the_map(
     toy_map, settings
 ) -> None:
-    def one() -> Trained:
+    def simulated() -> Trained:
         return train(SimulatedLandings(toy.launch, toy_map.surface), short(settings))
 
-    once, by_map = one(), train(toy_map.surface, short(settings))
-    assert same(once, one()) and not same(once, by_map)
+    once, by_map = simulated(), train(toy_map.surface, short(settings))
+    assert same(once, simulated()) and not same(once, by_map)
 
 
 def test_a_learned_exploration_narrows_by_itself(toy_map, settings) -> None:

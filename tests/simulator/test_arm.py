@@ -72,7 +72,7 @@ def test_it_costs_of_a_landing_what_it_costs_of_the_draw(sling, launch_setup):
     theta = neo(THETA)
     gives = replace(launch_setup, arm_stiffness=ARM)
     force = held(sling, gives, theta, np.array([DRAW]))[1][0]
-    firm, soft = (launch(sling, one, neo(THETA), DRAW) for one in (launch_setup, gives))
+    firm, soft = (launch(sling, setup, neo(THETA), DRAW) for setup in (launch_setup, gives))
     there = launch(sling, launch_setup, neo(THETA), np.array(DRAW) + force[1:] / ARM)
     assert soft.landing_y == pytest.approx(there.landing_y, abs=2e-3)
     assert soft.hold_force == pytest.approx(there.hold_force, rel=1e-4)
@@ -83,11 +83,11 @@ def test_an_arm_that_the_band_pulls_along_fails_by_name_or_is_balanced(sling, la
     """Over the whole box of θ, where some bands are stiffer than the arm."""
     weak = replace(launch_setup, arm_stiffness=500.0)
     thetas, draws = random_thetas(256, 3), random_draws(256, np.random.default_rng(3))
-    done, firm = (launch(sling, one, neo(thetas), draws) for one in (weak, launch_setup))
-    known = np.isfinite(done.hold_force)
-    assert all("converge" in done.failure[i] for i in np.flatnonzero(~known))
-    assert known[firm.hold_force < 100].all() and not known.all()
+    done, firm = (launch(sling, setup, neo(thetas), draws) for setup in (weak, launch_setup))
+    finite = np.isfinite(done.hold_force)
+    assert all("converge" in done.failure[i] for i in np.flatnonzero(~finite))
+    assert finite[firm.hold_force < 100].all() and not finite.all()
     along = draws / np.linalg.norm(draws, axis=1, keepdims=True)
     there = draws - along * np.nan_to_num(done.hold_force)[:, None] / weak.arm_stiffness
     balanced = launch(sling, launch_setup, neo(thetas), there).hold_force
-    assert done.hold_force[known] == pytest.approx(balanced[known], rel=5e-3)
+    assert done.hold_force[finite] == pytest.approx(balanced[finite], rel=5e-3)

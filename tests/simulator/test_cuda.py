@@ -81,21 +81,23 @@ def test_gpus_share_a_batch_and_change_nothing(
     space = SearchBox.of(load(DEFAULTS).parameters)
     unit = np.random.default_rng(8).random((67, space.dimension))
     teams = ("cuda:0",), ("cuda:1",), ("cuda:0", "cuda:1")
-    one, *others = (Evaluator(seen, strong_grip, loss, space, devices=team)(unit) for team in teams)
+    first, *others = (
+        Evaluator(seen, strong_grip, loss, space, devices=team)(unit) for team in teams
+    )
     for other in others:
-        assert other.failure == one.failure
-        np.testing.assert_array_equal(other.total, one.total)
-        for name, values in one.terms.items():
+        assert other.failure == first.failure
+        np.testing.assert_array_equal(other.total, first.total)
+        for name, values in first.terms.items():
             np.testing.assert_array_equal(other.terms[name], values)
 
     monkeypatch.setattr(import_module("pipeline.simulator.launch"), "SHARE", 1)
     thetas = space.parameters(space.to_physical(unit))
-    one, *others = (
+    first, *others = (
         launch(sling, launch_setup, thetas, [-0.4, -0.2], device=team) for team in teams
     )
     for other in others:
-        assert other.failure == one.failure
-        np.testing.assert_array_equal(other.landing_y, one.landing_y)
+        assert other.failure == first.failure
+        np.testing.assert_array_equal(other.landing_y, first.landing_y)
 
 
 def test_result_depends_on_no_neighbour_on_the_gpu(strong_grip, episode):

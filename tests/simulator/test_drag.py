@@ -45,17 +45,17 @@ def test_a_loose_band_falls_as_one_mass_in_the_wind(params):
     drags = np.array([0.0, 3.0, 40.0])
     for mesh in (ROD, TETRAHEDRA):  # contracting as it falls
         shape = params.sling.model_copy(update={"mesh": mesh})
-        found = fallen(
+        distances = fallen(
             ClampedBand.of(params.bands["band1"], params.setup, shape), drags, stretch=1.3
         )
-        assert found == pytest.approx([fall(drag) for drag in drags], rel=1e-5)
+        assert distances == pytest.approx([fall(drag) for drag in drags], rel=1e-5)
 
 
 def test_the_projectile_feels_no_wind(sling):
     """A stiff band with a load at its middle falls as both masses with the drag of one."""
     stiff = replace(sling, rest_length=0.02, mass=0.02)
-    (found,) = fallen(stiff, np.array([30.0]), payload=0.04)
-    assert found == pytest.approx(fall(30.0 * 0.02 / 0.06), rel=0.02)
+    (distance,) = fallen(stiff, np.array([30.0]), payload=0.04)
+    assert distance == pytest.approx(fall(30.0 * 0.02 / 0.06), rel=0.02)
 
 
 def test_drag_differs_by_rollout_and_slows_the_recoil(strong_grip, episode):
@@ -100,5 +100,5 @@ def test_air_takes_energy_from_a_recoil(sling, launch_setup):
     """Little: the projectile is heavier and slower than a band alone."""
     blown = (replace(sling, air_density=rho) for rho in (0.0, 1.2, 2.4))
     draw = [-0.35, -0.15]
-    far = [launch(one, launch_setup, neo(THETA), draw).landing_y[0] for one in blown]
+    far = [launch(band, launch_setup, neo(THETA), draw).landing_y[0] for band in blown]
     assert 0.99 * far[0] < far[2] < far[1] < 0.9999 * far[0]

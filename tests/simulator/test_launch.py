@@ -37,7 +37,7 @@ def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch, launch_se
     rng = np.random.default_rng(6)
     draws = np.column_stack([rng.uniform(-0.45, -0.1, 9), rng.uniform(-0.3, -0.1, 9)])
     thetas = np.column_stack([10 ** rng.uniform(5, 6.2, 9), np.tile(THETA[1:], (9, 1))])
-    one, requested = launch(sling, launch_setup, neo(thetas), draws), []
+    single, requested = launch(sling, launch_setup, neo(thetas), draws), []
 
     def run(sling, schedule, slings, options):
         requested.append((options.device, len(slings)))
@@ -53,10 +53,10 @@ def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch, launch_se
         monkeypatch.setattr(module, "SHARE", share)
         requested.clear()
         several = launch(sling, launch_setup, neo(thetas), draws, device=("a", "b", "c"))
-        assert set(requested) == expected and several.failure == one.failure
+        assert set(requested) == expected and several.failure == single.failure
         for name in ("landing_y", "speed", "angle", "hold_force", "separation_time"):
-            np.testing.assert_array_equal(getattr(several, name), getattr(one, name))
-    assert 0 < sum(reason is None for reason in one.failure) < 9
+            np.testing.assert_array_equal(getattr(several, name), getattr(single, name))
+    assert 0 < sum(reason is None for reason in single.failure) < 9
 
 
 def test_failures_have_names(sling, launch_setup):

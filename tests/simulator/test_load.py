@@ -60,8 +60,8 @@ def test_a_recorded_pull_reads_no_launch_setting(episode) -> None:
     launching = {"projectile_mass", "arm_stiffness", "fork_height", "foot_height"}
     launching |= {"launch_step", "launch_time"}
     setup, resolution = (
-        SimpleNamespace(**{name: value for name, value in one if name not in launching})
-        for one in (PARAMS.setup, PARAMS.sling)
+        SimpleNamespace(**{name: value for name, value in section if name not in launching})
+        for section in (PARAMS.setup, PARAMS.sling)
     )
     band = ClampedBand.of(PARAMS.bands["band1"], setup, resolution)
     assert interact(band, episode, Parameters.of("neo_hookean", [*VALUES.values()])).failure == [

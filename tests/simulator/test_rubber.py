@@ -35,14 +35,14 @@ def rubber(sling):
 def test_without_its_parameters_it_is_the_neo_hookean_law_to_the_bit(
     sling, rubber, episode, launch_setup
 ):
-    for one, other in zip(
+    for plain, other in zip(
         (interact(sling, episode, neo(THETA)), launch(sling, launch_setup, neo(THETA), DRAW)),
         (interact(rubber, episode, gum()), launch(rubber, launch_setup, gum(), DRAW)),
         strict=True,
     ):
         same = "force", "center_line", "landing_y", "hold_force"
-        for name in (name for name in same if hasattr(one, name)):
-            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        for name in (name for name in same if hasattr(plain, name)):
+            np.testing.assert_array_equal(getattr(plain, name), getattr(other, name))
 
 
 def test_each_parameter_has_its_effect(rubber, launch_setup):
@@ -82,24 +82,26 @@ def test_each_launch_of_a_batch_has_what_its_band_had_seen(rubber, launch_setup)
 
     seen = np.array([0.30, 0.30, 0.42, 0.55])
     together = launched(seen)
-    np.testing.assert_array_equal(together, [launched(float(one))[0] for one in seen])
+    np.testing.assert_array_equal(together, [launched(float(depth))[0] for depth in seen])
     assert together[0] > 1.01 * together[2] > 1.01 * together[3]
     np.testing.assert_array_equal(launched(seen, 0.0), launched(0.30, 0.0)[0])
 
 
 def test_every_theta_may_have_its_own_parameters(rubber, launch_setup):
-    own = {
+    parameters = {
         "mooney_share": np.array([0.0, 0.5, -0.2]),
         "upturn": np.array([0.0, 0.1, 0.2]),
         "softening": np.array([0.3, 0.0, 0.1]),
         "relaxation": np.array([0.0, 0.01, 0.03]),
     }
     history = LaunchHistory(2.0, 1.0)
-    many = gum(**own)
+    many = gum(**parameters)
     launch_setup = replace(launch_setup, history=history)
     together = launch(rubber, launch_setup, many, DRAW).landing_y
     alone = [
-        launch(rubber, launch_setup, gum(**{name: own[name][k] for name in own}), DRAW).landing_y[0]
+        launch(
+            rubber, launch_setup, gum(**{name: parameters[name][k] for name in parameters}), DRAW
+        ).landing_y[0]
         for k in range(3)
     ]
     np.testing.assert_array_equal(together, alone)
@@ -147,10 +149,10 @@ def test_history_of_a_recording():
     position[time > 8] = [0.0, -0.5, -0.1]
     episode = SimpleNamespace(time=time, position=position, grasp_time=1.0, release_time=8.0)
     episode.band = "test"
-    found = launch_history(episode)
-    assert found["pull_time"] == pytest.approx(4.0, abs=0.1)
-    assert found["pause"] == pytest.approx(2.0, abs=0.1)
-    assert found["deepest"] == pytest.approx(np.hypot(0.4, 0.1), abs=1e-6)
+    history = launch_history(episode)
+    assert history["pull_time"] == pytest.approx(4.0, abs=0.1)
+    assert history["pause"] == pytest.approx(2.0, abs=0.1)
+    assert history["deepest"] == pytest.approx(np.hypot(0.4, 0.1), abs=1e-6)
     assert launch_history(SimpleNamespace(**vars(episode) | {"release_time": 1e6}))["pause"] <= 1e5
     for release in (-1.0, 8.0):
         still = vars(episode) | {"release_time": release, "position": 0 * position}

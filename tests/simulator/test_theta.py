@@ -52,10 +52,10 @@ def test_the_drag_comes_back(tmp_path: Path) -> None:
     output = {"air_drag": 2.5}
     file.write_text(json.dumps({"band": "red", "theta": SOFT, "nuisances": output}))
     assert load_theta(file, "red")["nuisances"] == output
-    found = parameters_of(load_theta(file, "red"))
-    assert found.column("air_drag").tolist() == [2.5]
+    parameters = parameters_of(load_theta(file, "red"))
+    assert parameters.column("air_drag").tolist() == [2.5]
     assert parameters_of({"theta": SOFT}).column("air_drag").tolist() == [0.0]
-    assert parameters_of(content_of(found)).values.tolist() == found.values.tolist()
+    assert parameters_of(content_of(parameters)).values.tolist() == parameters.values.tolist()
 
 
 def test_the_law_rubber_names_its_parameters(tmp_path: Path) -> None:
@@ -67,10 +67,10 @@ def test_the_law_rubber_names_its_parameters(tmp_path: Path) -> None:
     whole = {"band": "red", "law": "rubber", "theta": SOFT | rubber, "history": history}
     file.write_text(json.dumps(whole))
     content = load_theta(file, "red")
-    found = parameters_of(content)
-    assert found.values.tolist() == [[*SOFT.values(), 0.3, 0.0, 0.1, 0.02, 0.0, 0.0, 1.0]]
-    assert found.theta.tolist() == [list(SOFT.values())]
-    written = content_of(found, LaunchHistory(**history))
+    parameters = parameters_of(content)
+    assert parameters.values.tolist() == [[*SOFT.values(), 0.3, 0.0, 0.1, 0.02, 0.0, 0.0, 1.0]]
+    assert parameters.theta.tolist() == [list(SOFT.values())]
+    written = content_of(parameters, LaunchHistory(**history))
     assert (written["law"], written["theta"], written["history"]) == (
         "rubber",
         SOFT | rubber,
@@ -107,9 +107,9 @@ def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:
     assert load_samples(path, best) is None
     content = {"names": list(THETA), "samples": samples.tolist()}
     path.write_text(json.dumps(content))
-    found = load_samples(path, best)
-    np.testing.assert_array_equal(found.theta, samples)
-    assert found.column("air_drag").tolist() == [0.7] * 3  # as the best one, where it has none
+    parameters = load_samples(path, best)
+    np.testing.assert_array_equal(parameters.theta, samples)
+    assert parameters.column("air_drag").tolist() == [0.7] * 3  # as the best one, where it has none
     path.write_text('{"samples": []}')  # of a θ without confidence
     assert load_samples(path, best) is None
     with_drag = {"names": [*THETA, "air_drag"], "samples": [[0.5] * 6] * 4}

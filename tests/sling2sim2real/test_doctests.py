@@ -59,11 +59,11 @@ def test_the_page_of_it_and_the_notebook_run(tmp_path, monkeypatch, capsys) -> N
     page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
     code = page.split("```python\n")[1].split("```")[0]
     notebook = json.loads((ROOT / "examples" / "from_python.ipynb").read_text(encoding="utf-8"))
-    cells = [one for one in notebook["cells"] if one["cell_type"] == "code"]
-    assert [line for one in cells for line in "".join(one["source"]).splitlines() if line] == [
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert [line for cell in cells for line in "".join(cell["source"]).splitlines() if line] == [
         line for line in code.splitlines() if line
     ]
-    assert not any(one["outputs"] for one in cells)
+    assert not any(cell["outputs"] for cell in cells)
     monkeypatch.chdir(tmp_path)
     names: dict = {}
     for cell in cells:

@@ -82,11 +82,11 @@ def test_an_mcap_is_read_as_the_pipeline_reads_it(tmp_path_factory) -> None:
     window = {"duration": 3.6, "samples": 120, "tail": 0.5}
     theirs = load(DEFAULTS)
     theirs = theirs.model_copy(update={"episode": theirs.episode.model_copy(update=window)})
-    about = theirs.bands["band1"]
-    band = Band(about.mass, about.diameter, about.rest_length, name="mine")
+    band_params = theirs.bands["band1"]
+    band = Band(band_params.mass, band_params.diameter, band_params.rest_length, name="mine")
     ours = read_mcap(path, band, settings=Settings.default(episode=window))
-    known, _ = build_episodes(path, "band1", theirs)
-    assert len(ours) == len(known) == 1
-    assert np.array_equal(ours[0].force, known[0].force)
-    assert all(map(np.array_equal, ours[0].clouds, known[0].clouds))
+    expected, _ = build_episodes(path, "band1", theirs)
+    assert len(ours) == len(expected) == 1
+    assert np.array_equal(ours[0].force, expected[0].force)
+    assert all(map(np.array_equal, ours[0].clouds, expected[0].clouds))
     assert ours[0].band == "mine"

@@ -21,42 +21,43 @@ FITTED = "youngs_modulus", "elasticity_damping", "mooney_share", "relaxation"
 
 
 @pytest.fixture(scope="module")
-def found(band, settings, world, episode) -> Identification:
+def identification(band, settings, world, episode) -> Identification:
     return identify([episode], band, settings=settings, start=world)
 
 
 @pytest.mark.slow
 def test_a_known_band_is_found_without_a_start(band, settings, world, episode) -> None:
     summary = []
-    found = identify([episode], band, settings=settings, progress=summary.append)
-    assert found.settled
+    identification = identify([episode], band, settings=settings, progress=summary.append)
+    assert identification.settled
     for name in FITTED:
-        one = found.intervals[name]
-        assert one.low < getattr(world.theta, name) < one.high
-        assert one.value == getattr(found.theta, name)
-        assert one.identifiable or name == "elasticity_damping"  # which one picture hardly tells
-    assert not found.intervals["dynamic_friction"].identifiable
-    assert found.samples.shape == (200, len(found.theta.names))
+        interval = identification.intervals[name]
+        assert interval.low < getattr(world.theta, name) < interval.high
+        assert interval.value == getattr(identification.theta, name)
+        # which one picture hardly tells
+        assert interval.identifiable or name == "elasticity_damping"
+    assert not identification.intervals["dynamic_friction"].identifiable
+    assert identification.samples.shape == (200, len(identification.theta.names))
     assert [line.split()[0] for line in summary[:3]] == ["mounting:", "explored", "expansion"]
-    assert abs(np.degrees(np.arcsin(found.mounting.clamp_direction[0]))) < 10
+    assert abs(np.degrees(np.arcsin(identification.mounting.clamp_direction[0]))) < 10
 
 
-def test_launches_move_what_is_found(band, settings, world, episode, found) -> None:
-    draw = aim(found, 2.0).draw
-    before = launch(found, draw).landing
+def test_launches_move_what_is_found(band, settings, world, episode, identification) -> None:
+    draw = aim(identification, 2.0).draw
+    before = launch(identification, draw).landing
     short = Observed(draw, error=1e-3, landing=before - 0.1)
-    after = identify([episode], band, launches=[short], settings=settings, start=found)
+    after = identify([episode], band, launches=[short], settings=settings, start=identification)
     assert before - 0.1 - TAPE < launch(after, draw).landing < before - 0.02
-    wide, narrow = (np.ptp(aim(one, 2.0).interval_90) for one in (found, after))
+    wide, narrow = (np.ptp(aim(result, 2.0).interval_90) for result in (identification, after))
     assert narrow < wide
 
 
-def test_what_is_saved_is_loaded(found, tmp_path) -> None:
+def test_what_is_saved_is_loaded(identification, tmp_path) -> None:
     path = tmp_path / "mine.json"
-    found.save(path)
+    identification.save(path)
     again = Identification.load(path)
-    assert again == found and np.array_equal(again.samples, found.samples)
-    assert aim(again, 2.0) == aim(found, 2.0)
+    assert again == identification and np.array_equal(again.samples, identification.samples)
+    assert aim(again, 2.0) == aim(identification, 2.0)
     path.write_text(json.dumps(json.loads(path.read_text()) | {"sizes": {"mass": 1}}))
     with pytest.raises(UserError, match="was not written by Identification.save"):
         Identification.load(path)
@@ -86,7 +87,7 @@ def test_a_run_of_other_settings_says_what_has_changed(tmp_path) -> None:
         Layout(tmp_path).theta("band1", "least_squares"),
         {"band": "band1", "theta": soft, "made_with": made},
     )
-    found = Identification.of_run("band1", root=tmp_path)
-    assert found.changed == ("bands.band1.mass was 0.05, is 0.023",)
-    summary = [*_warnings(found, (-0.3, -0.1), None, (1.9, 2.1))]
-    assert summary[-1] == f"params.yaml: {found.changed[0]}, since θ was identified"
+    identification = Identification.of_run("band1", root=tmp_path)
+    assert identification.changed == ("bands.band1.mass was 0.05, is 0.023",)
+    summary = [*_warnings(identification, (-0.3, -0.1), None, (1.9, 2.1))]
+    assert summary[-1] == f"params.yaml: {identification.changed[0]}, since θ was identified"

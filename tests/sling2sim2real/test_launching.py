@@ -36,10 +36,10 @@ def test_no_draw_that_lands_there_takes_less_force(world, aimed) -> None:
 def test_the_interval_holds_what_samples_say(world, aimed) -> None:
     near = world.theta.point * np.ones((50, 1))
     near[:, 0] *= np.linspace(0.9, 1.1, 50)
-    about = {name: getattr(world, name) for name in ("band", "theta", "settings")}
-    sure = Identification(**about, samples=near[24:26], settled=True)
-    unsure = Identification(**about, samples=near, settled=False, stretch=1.2)
-    narrow, wide = (np.ptp(aim(one, 2.0).interval_90) for one in (sure, unsure))
+    arguments = {name: getattr(world, name) for name in ("band", "theta", "settings")}
+    sure = Identification(**arguments, samples=near[24:26], settled=True)
+    unsure = Identification(**arguments, samples=near, settled=False, stretch=1.2)
+    narrow, wide = (np.ptp(aim(result, 2.0).interval_90) for result in (sure, unsure))
     assert wide > 3 * narrow
     assert aim(sure, 2.0).warnings == ()
     summary = aim(unsure, 2.0).warnings
@@ -80,13 +80,13 @@ def test_a_runs_policy_is_asked_as_the_command_asks_it(world, tmp_path) -> None:
     policy = Stored("toy", "none", tmp_path)
     write_policy(policy.folder / "policy.onnx", (-0.05, 0.0), (-0.2, -0.15))
     put_card(policy.folder, world.theta.content("toy")["theta"])
-    about = {name: getattr(world, name) for name in ("band", "theta", "settings")}
-    found = aim(Identification(**about, policy=policy), 2.0)
-    np.testing.assert_allclose(found.draw, policy.draws(np.array([2.0]))[0])
-    assert not any("another θ" in warning for warning in found.warnings)
+    arguments = {name: getattr(world, name) for name in ("band", "theta", "settings")}
+    answer = aim(Identification(**arguments, policy=policy), 2.0)
+    np.testing.assert_allclose(answer.draw, policy.draws(np.array([2.0]))[0])
+    assert not any("another θ" in warning for warning in answer.warnings)
     put_card(policy.folder, {"youngs_modulus": 1.0})
-    summary = aim(Identification(**about, policy=policy), 2.0).warnings
-    assert any("another θ" in one for one in summary)
+    summary = aim(Identification(**arguments, policy=policy), 2.0).warnings
+    assert any("another θ" in warning for warning in summary)
 
 
 def put_card(folder, theta: dict) -> None:

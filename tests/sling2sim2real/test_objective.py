@@ -19,7 +19,7 @@ def test_it_is_the_loss_of_the_method(world, episode) -> None:
     sling = ClampedBand.of(world.band, settings.setup, settings.sling)
     loss = EpisodeLoss.of(settings, "real2sim2real", episode, sling)
     space = SearchBox.of_method(settings, "real2sim2real")
-    whole = [space.unit_of(objective.theta(one).parameters)[0] for one in unit]
+    whole = [space.unit_of(objective.theta(point).parameters)[0] for point in unit]
     theirs = Evaluator(episode, sling, loss, space)(np.array(whole)).total
     assert np.allclose(objective(unit), 2 * theirs)
 
@@ -41,8 +41,8 @@ def test_a_loss_of_ones_own(world, episode) -> None:
     softer = true - 0.05 * (np.arange(len(true)) == 0)
     here, there = objective(np.stack([true, softer]))
     assert here < 0.3 < there
-    one = simulate_batch(world, episode, [objective.theta(softer)])[0]
-    assert there == peak(one, episode)
+    rollout = simulate_batch(world, episode, [objective.theta(softer)])[0]
+    assert there == peak(rollout, episode)
 
 
 def test_what_no_simulation_can_follow_is_infinite(world, episode) -> None:

@@ -53,9 +53,9 @@ def test_a_wheel_has_all_that_it_needs(tmp_path) -> None:
 
 def requested(place: str, folder) -> list[str]:
     """What ASK prints in `folder`, with the package that lies in `place`."""
-    known = {**os.environ, "PYTHONPATH": place}
-    about = {"cwd": folder, "env": known, "capture_output": True, "text": True, "timeout": 240}
-    done = subprocess.run([sys.executable, "-c", ASK], **about)
+    env = {**os.environ, "PYTHONPATH": place}
+    options = {"cwd": folder, "env": env, "capture_output": True, "text": True, "timeout": 240}
+    done = subprocess.run([sys.executable, "-c", ASK], **options)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
 

@@ -32,9 +32,9 @@ def test_each_pull_of_each_file_becomes_an_episode_in_order(folder, seen, blind,
     left = Layout().episode("band1", 4)  # by an earlier run
     left.mkdir(parents=True)
     episode.main()
-    found = [one.metadata["input"] for one in load_episodes("band1")]
-    about = [(one["file"], one["pull"]) for one in found]
-    assert about == [("a.mcap", 1), ("a.mcap", 3), ("b.mcap", 1)]
+    inputs = [saved.metadata["input"] for saved in load_episodes("band1")]
+    pulls = [(source["file"], source["pull"]) for source in inputs]
+    assert pulls == [("a.mcap", 1), ("a.mcap", 3), ("b.mcap", 1)]
     assert not left.exists()
     message = capsys.readouterr()
     assert message.err.startswith(
@@ -49,11 +49,11 @@ def test_a_split_bag_becomes_one_episode(folder, seen) -> None:
     split(seen[0], folder, (1.5,), "c")
     shutil.copy(seen[0], folder / "a.mcap")
     episode.main()
-    whole, *found = load_episodes("band1")
-    assert [one.metadata["input"]["file"] for one in found] == ["b", "c_0.mcap"]
-    for one in found:
-        np.testing.assert_array_equal(one.force, whole.force)
-        assert len(one.clouds) == len(whole.clouds) and one.release_time == whole.release_time
+    whole, *parts = load_episodes("band1")
+    assert [part.metadata["input"]["file"] for part in parts] == ["b", "c_0.mcap"]
+    for part in parts:
+        np.testing.assert_array_equal(part.force, whole.force)
+        assert len(part.clouds) == len(whole.clouds) and part.release_time == whole.release_time
 
 
 def test_a_file_without_a_pull_that_can_be_used_leaves_the_episodes_alone(
@@ -72,8 +72,8 @@ def test_a_file_without_a_pull_that_can_be_used_leaves_the_episodes_alone(
 def test_a_band_without_a_recording_says_who_makes_one(folder, params, monkeypatch) -> None:
     with pytest.raises(NotMade, match="data/raw/band1/band1.mcap: missing"):
         episode.main()
-    own = params.bands["band1"].model_copy(update={"source": "recording"})
-    own = params.model_copy(update={"bands": {"band1": own}})
-    monkeypatch.setattr(episode, "started", lambda *_: (own, "band1"))
+    changed = params.bands["band1"].model_copy(update={"source": "recording"})
+    changed = params.model_copy(update={"bands": {"band1": changed}})
+    monkeypatch.setattr(episode, "started", lambda *_: (changed, "band1"))
     with pytest.raises(UserError, match="sling add-recording --band band1 FILE.mcap` puts one"):
         episode.main()

@@ -16,8 +16,8 @@ SYSTEM = "/usr/bin:/bin"
 @pytest.fixture
 def toy(tmp_path: Path) -> Toy:
     """A project whose one stage is run as those of dvc.yaml are."""
-    one = {"cmd": "sh stages/run.sh one x", "deps": ["word"], "outs": ["one.out"]}
-    toy = Toy(tmp_path / "toy", {"one": one}, word="one")
+    stage = {"cmd": "sh stages/run.sh one x", "deps": ["word"], "outs": ["one.out"]}
+    toy = Toy(tmp_path / "toy", {"one": stage}, word="one")
     (toy.folder / "stages").mkdir()
     (toy.folder / "stages/run.sh").write_bytes((ROOT / "stages/run.sh").read_bytes())
     script = "import sys, warp\nopen('one.out', 'w').write(sys.argv[1])\n"
@@ -26,11 +26,11 @@ def toy(tmp_path: Path) -> Toy:
 
 
 def repro(toy: Toy, path: str) -> subprocess.CompletedProcess:
-    known = toy.environment | {"PATH": path}
-    known.pop("PYTHONPATH")
+    env = toy.environment | {"PATH": path}
+    env.pop("PYTHONPATH")
     command = [sys.executable, "-m", "dvc", "repro", "--force"]
-    about = {"capture_output": True, "text": True, "timeout": 240}
-    return subprocess.run(command, cwd=toy.folder, env=known, **about)
+    options = {"capture_output": True, "text": True, "timeout": 240}
+    return subprocess.run(command, cwd=toy.folder, env=env, **options)
 
 
 def test_a_stage_runs_where_no_environment_is_active(toy: Toy) -> None:

@@ -199,7 +199,7 @@ def test_a_stage_clears_what_a_killed_dvc_has_copied_in_part(tmp_path: Path) -> 
         code = "from stages.start import run; run(lambda: None)"
         done = python("-c", code, folder=tmp_path, DVC_STAGE="a")
         assert (done.returncode, done.stderr) == (0, "")
-        return [one.exists() for one in (*halves, *others)]
+        return [path.exists() for path in (*halves, *others)]
 
     with Lock(str(locks / "lock")):
         assert run_stage() == [True, True, True, True]

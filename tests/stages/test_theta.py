@@ -43,9 +43,9 @@ def test_what_a_method_leaves_out_is_left_out_everywhere(
             runpy.run_module(f"stages.{stage}", run_name="__main__")
         assert not ended.value.code
     path = layout.theta("band1", "sling2sim2real")
-    found = load_theta(path, "band1")
+    saved = load_theta(path, "band1")
     assert json.loads(path.read_text()).get("mounted") == (None if mounting else False)
-    assert (calibrated(params, "band1", found).flexural_rigidity == 2e-3) == mounting
+    assert (calibrated(params, "band1", saved).flexural_rigidity == 2e-3) == mounting
     summary = Identification.of_run("band1", "sling2sim2real")
     assert (summary.mounting is not None) == mounting
     folders = {folder.name for folder in Path(".checkpoints").iterdir()}

@@ -30,19 +30,21 @@ def test_pairs_are_compared_by_signed_ranks() -> None:
     base = np.arange(10.0)
     shifted = base + 1 + 0.01 * np.arange(10)
     broken = np.where(base < 9, shifted, np.nan)
-    found = compared({"a": base, "shifted": shifted, "broken": broken, "same": base}, "a")
-    assert found["shifted"]["p"] == pytest.approx(2 / 2**10)  # all ranks of one sign
-    assert found["broken"]["n"] == 9
-    assert found["broken"]["p"] == pytest.approx(2 / 2**9)
-    assert found["same"]["p_holm"] == 1
-    assert found["shifted"]["p_holm"] == pytest.approx(3 * 2 / 2**10)
-    assert found["shifted"]["low"] < found["shifted"]["mean"] < found["shifted"]["high"]
+    comparison = compared({"a": base, "shifted": shifted, "broken": broken, "same": base}, "a")
+    assert comparison["shifted"]["p"] == pytest.approx(2 / 2**10)  # all ranks of one sign
+    assert comparison["broken"]["n"] == 9
+    assert comparison["broken"]["p"] == pytest.approx(2 / 2**9)
+    assert comparison["same"]["p_holm"] == 1
+    assert comparison["shifted"]["p_holm"] == pytest.approx(3 * 2 / 2**10)
+    assert (
+        comparison["shifted"]["low"] < comparison["shifted"]["mean"] < comparison["shifted"]["high"]
+    )
 
 
 def test_an_interval_holds_the_mean_as_often_as_it_says() -> None:
     rng = np.random.default_rng(3)
     confidence = [mean_interval(rng.normal(size=40)) for _ in range(200)]
-    inside = np.mean([one["low"] < 0 < one["high"] for one in confidence])
+    inside = np.mean([interval["low"] < 0 < interval["high"] for interval in confidence])
     assert 0.88 < inside < 0.99
     assert mean_interval([np.nan])["mean"] is None
 
@@ -64,10 +66,10 @@ def bowl(points: np.ndarray) -> np.ndarray:
 
 
 def test_plain_starts_explore_alike_and_begin_as_wide_balls() -> None:
-    about = {"rollouts": 160, "seed": 4, "population": 10}
+    options = {"rollouts": 160, "seed": 4, "population": 10}
     settings = {"generations": 3, "k_top": 2, "delta": 0.1, "cma_population": 60}
-    points, batches = spent(build("validation.searches:PlainStarts", 3, **about, **settings), 160)
-    explored, _ = spent(build("de", 3, **about), 40)
+    points, batches = spent(build("validation.searches:PlainStarts", 3, **options, **settings), 160)
+    explored, _ = spent(build("de", 3, **options), 40)
     assert batches == [("de", 10)] * 4 + [("cma", 120)]
     assert np.array_equal(points[:40], explored)
     centre = explored[np.argmin(bowl(explored))]
@@ -77,16 +79,16 @@ def test_plain_starts_explore_alike_and_begin_as_wide_balls() -> None:
 
 
 def test_small_batches_see_every_point() -> None:
-    about = {"rollouts": 16, "seed": 1, "population": 8}
-    optimizer = build("validation.searches:SmallBatches", 2, **about)
+    options = {"rollouts": 16, "seed": 1, "population": 8}
+    optimizer = build("validation.searches:SmallBatches", 2, **options)
     points, batches = spent(optimizer, 16)
     assert [size for _, size in batches] == [8, 4, 4]
     assert optimizer._points >= len(points)
 
 
 def test_plain_adam_descends_from_one_point() -> None:
-    about = {"rollouts": 240, "seed": 2, "population": 20}
-    points, batches = spent(build("validation.searches:PlainAdam", 3, **about), 240)
+    options = {"rollouts": 240, "seed": 2, "population": 20}
+    points, batches = spent(build("validation.searches:PlainAdam", 3, **options), 240)
     assert {size for _, size in batches} == {4}
     assert points[0] == pytest.approx(latin_hypercube(3, 1, 2)[0])
     assert bowl(points[-1:])[0] < 0.01 < bowl(points[:1])[0]
@@ -94,12 +96,12 @@ def test_plain_adam_descends_from_one_point() -> None:
 
 def results(offset: dict[str, float]) -> list[dict]:
     """Of every job of two recordings of a band, misses of 1, 2, ... cm and a method's offset."""
-    found = []
+    rows = []
     for job in jobs_of(["band1"], [*offset], 2, 3):
         miss = 0.01 * (job.recording - FIRST + job.seed + offset[job.method])
-        about = {"theta": {"youngs_modulus": 2e5}, "loss": None, "seconds": 1.0}
-        found.append(vars(job) | about | {"error_m": [miss, -miss, None]})
-    return found
+        result = {"theta": {"youngs_modulus": 2e5}, "loss": None, "seconds": 1.0}
+        rows.append(vars(job) | result | {"error_m": [miss, -miss, None]})
+    return rows
 
 
 def test_a_summary_pairs_recordings_and_spreads_seeds() -> None:
@@ -130,7 +132,7 @@ def test_each_variant_changes_what_its_name_says_and_nothing_stays_changed() -> 
         assert (changed.methods[name], changed.optimizer, changed.loss) != (
             large.methods[PAPER], large.optimizer, large.loss
         ), name  # fmt: skip
-    assert [rollouts_of_search(one, PAPER) for one in (usual, large)] == [600, 5760]
+    assert [rollouts_of_search(params, PAPER) for params in (usual, large)] == [600, 5760]
     assert rollouts_of_search(with_variants(of_job(default, "bo", "large")), "bo") == 2400
     before = dict(coordinates.PRIORS)
     for name, (width, factor) in PRIOR_CHANGES.items():

@@ -24,14 +24,14 @@ def as_delivered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(DEFAULTS.parent)
 
 
-@pytest.mark.parametrize("switch", [one for one in SWITCHES if one != AS_IS])
+@pytest.mark.parametrize("switch", [switch for switch in SWITCHES if switch != AS_IS])
 def test_a_switch_is_the_key_that_it_is_called_by(switch: str) -> None:
     """As if it were written into params.yaml; tetrahedra want methods with rubber to go first."""
     content = YAML(typ="safe").load(DEFAULTS)
     key, value = switch.split(": ")
     section, name = ("method_defaults", key) if key == "mounting" else key.split(".")
     content[section][name] = {"false": False}.get(value, value)
-    found = deviations.params_of("band1", switch)
+    params = deviations.params_of("band1", switch)
     if value == "tetrahedra":
         for method in [*content["methods"]]:
             if content["methods"][method].get("law") == "rubber":
@@ -41,14 +41,14 @@ def test_a_switch_is_the_key_that_it_is_called_by(switch: str) -> None:
                     content["run"]["steps"][step].remove(method)
         first = content["run"]["methods"][0]
         content["run"]["own_steps"] = {
-            step: [one for one in names if one == first]
+            step: [candidate for candidate in names if candidate == first]
             for step, names in content["run"]["steps"].items()
         }
     expected = check(content)
     if section != "method_defaults":
-        assert getattr(found, section) == getattr(expected, section)
-    assert {n: found.methods[n] for n in expected.methods} == dict(expected.methods)
-    assert found != load(DEFAULTS)
+        assert getattr(params, section) == getattr(expected, section)
+    assert {n: params.methods[n] for n in expected.methods} == dict(expected.methods)
+    assert params != load(DEFAULTS)
 
 
 def test_cases_are_distinct(tmp_path: Path) -> None:
@@ -80,9 +80,9 @@ def report_of(results: list[dict]) -> dict:
 
 def test_the_report_is_written_into_the_page(tmp_path: Path, monkeypatch) -> None:
     """What stood between the marks goes; all else stays."""
-    one = {"band": "band1", "recording": 0, "seed": 1, "peak_force": -0.1, "loss": 1.0}
+    row = {"band": "band1", "recording": 0, "seed": 1, "peak_force": -0.1, "loss": 1.0}
     results = [
-        one | {"method": method, "switch": switch, "youngs_modulus": young, "miss": miss}
+        row | {"method": method, "switch": switch, "youngs_modulus": young, "miss": miss}
         for method in (PAPER, OURS)
         for switch, young, miss in ((AS_IS, 2e5, 0.1), ("mounting: false", 3e5, 0.08))
     ]

@@ -22,30 +22,30 @@ def all_of(switch: str, **more) -> list[dict]:
 
 def test_a_setting_is_compared_band_by_band_and_seed_by_seed() -> None:
     changed = [
-        one | {"youngs_modulus": 1.2 * one["youngs_modulus"], "peak_force": -0.02, "miss": 0.08}
-        for one in all_of("other")
+        row | {"youngs_modulus": 1.2 * row["youngs_modulus"], "peak_force": -0.02, "miss": 0.08}
+        for row in all_of("other")
     ]
-    found = effects(all_of(AS_IS) + changed, [AS_IS, "other", "never run"], ["m"], BANDS)["m"]
-    assert set(found["rig"]) == {AS_IS, "other"}
-    other = found["rig"]["other"]
+    figures = effects(all_of(AS_IS) + changed, [AS_IS, "other", "never run"], ["m"], BANDS)["m"]
+    assert set(figures["rig"]) == {AS_IS, "other"}
+    other = figures["rig"]["other"]
     assert other["runs"] == 4 and other["failed"] == 0
     assert other["youngs_modulus_change"]["mean"] == pytest.approx(0.2)
     assert other["youngs_modulus_change"]["std"] == pytest.approx(0, abs=1e-12)
     assert other["miss_change"]["mean"] == pytest.approx(0.03)
-    heads, _, *lines = table({"m": found, "n": {}}, ROWS, {"m": "mine", "n": "yours"})
+    heads, _, *lines = table({"m": figures, "n": {}}, ROWS, {"m": "mine", "n": "yours"})
     names = "mine: E | force | miss | yours: E | force | miss"
     assert heads == f"| as the paper has it | bands | {names} |"
     assert lines == [
         "| nothing | rig | 550 kPa | +1.0 % | 5.0 cm |  |  |  |",
         "| `other` | rig | +20.0 % | −2.0 % | 8.0 cm (**+3.0, +3.0 to +3.0**) |  |  |  |",
     ]
-    assert runs({"m": found}, ROWS, {"m": "mine"}) == ["mine: 4 a row."]
+    assert runs({"m": figures}, ROWS, {"m": "mine"}) == ["mine: 4 a row."]
 
 
 def test_a_change_that_may_be_none_is_not_bold() -> None:
-    changed = [one | {"miss": 0.05 + 0.02 * (-1) ** one["seed"]} for one in all_of("other")]
-    found = effects(all_of(AS_IS) + changed, [AS_IS, "other"], ["m"], BANDS)
-    line = table(found, ROWS, {"m": "mine"})[-1]
+    changed = [row | {"miss": 0.05 + 0.02 * (-1) ** row["seed"]} for row in all_of("other")]
+    figures = effects(all_of(AS_IS) + changed, [AS_IS, "other"], ["m"], BANDS)
+    line = table(figures, ROWS, {"m": "mine"})[-1]
     assert line.endswith("| 5.0 cm (+0.0, −2.0 to +2.0) |")
 
 
@@ -81,7 +81,7 @@ def test_what_failed_or_missed_is_counted_and_takes_no_part() -> None:
 
 
 def test_a_setting_of_which_nothing_is_known_has_no_figure() -> None:
-    failed = [{key: one[key] for key in KEY} | {"failed": "why"} for one in all_of("other")[:1]]
+    failed = [{key: row[key] for key in KEY} | {"failed": "why"} for row in all_of("other")[:1]]
     figures = effects(all_of(AS_IS) + failed, [AS_IS, "other"], ["m"], BANDS)
     assert table(figures, ROWS, {"m": "mine"})[-1] == "| `other` | rig | no θ | no θ | no θ |"
     summary = ["mine: 4 a row, 1 `other`.", "mine, `other`: 1 of 1 found no θ."]

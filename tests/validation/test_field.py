@@ -46,7 +46,9 @@ def test_a_fault_changes_what_it_says(blind) -> None:
     late = made("force_late", 10)
     moved = [a.stamp - b.stamp for a, b in zip(late.of(FORCE), sound.of(FORCE), strict=True)]
     assert set(moved) == {10_000_000}
-    assert [one.stamp for one in late.of(POSE)] == [one.stamp for one in sound.of(POSE)]
+    assert [message.stamp for message in late.of(POSE)] == [
+        message.stamp for message in sound.of(POSE)
+    ]
     turned = made("turned", 10).force
     sizes = np.linalg.norm(turned, axis=1), np.linalg.norm(sound.force, axis=1)
     np.testing.assert_allclose(*sizes)

@@ -43,17 +43,17 @@ def write(project: Path, name: str, **content) -> None:
 
 
 def only(project: Path) -> figures.CommittedFigures:
-    (found,) = listed(project, outdated, project)
-    return found
+    (committed,) = listed(project, outdated, project)
+    return committed
 
 
 def test_digests_of_folders_decide_where_a_file_has_them(project: Path) -> None:
     parts = ("pipeline/simulator", "validation/bench.py")
     code = {part: digest(project / part) for part in parts}
     write(project, "validation/x.json", code=code, met=False, commit="0" * 7)
-    found = only(project)
-    assert (found.file, found.state) == ("reports/validation/x.json", TODAY)
-    assert (found.changed, found.met, len(found.digest)) == ([], False, 12)
+    committed = only(project)
+    assert (committed.file, committed.state) == ("reports/validation/x.json", TODAY)
+    assert (committed.changed, committed.met, len(committed.digest)) == ([], False, 12)
     (project / "pipeline/simulator/deep/er.py").write_text("a = 2\n")
     assert (only(project).state, only(project).changed) == (OLDER, ["pipeline/simulator"])
     (project / "validation/bench.py").unlink()
@@ -68,7 +68,7 @@ def test_a_campaign_may_have_a_folder(project: Path) -> None:
 
 def test_without_digests_the_simulator_and_the_commit_decide(project: Path) -> None:
     commit, sling = git(project, "rev-parse", "--short", "HEAD"), project / "pipeline/simulator"
-    for about, state in (
+    for content, state in (
         ({}, UNKNOWN),
         ({"commit": None, "simulator": digest(sling)}, UNKNOWN),
         ({"commit": None, "simulator": "0123456789ab"}, OLDER),
@@ -77,12 +77,12 @@ def test_without_digests_the_simulator_and_the_commit_decide(project: Path) -> N
         ({"commit": commit, "simulator": digest(sling)}, TODAY),
         ({"commit": f"{commit}-dirty"}, UNKNOWN),
     ):
-        write(project, "benchmarks/x.json", **about)
-        assert only(project).state == state, about
+        write(project, "benchmarks/x.json", **content)
+        assert only(project).state == state, content
     assert not (project / "x").exists()
     (project / "validation/bench.py").write_text("a = 3\n")
-    for known in (commit, f"{commit}-dirty"):
-        write(project, "benchmarks/x.json", commit=known, simulator=digest(sling))
+    for revision in (commit, f"{commit}-dirty"):
+        write(project, "benchmarks/x.json", commit=revision, simulator=digest(sling))
         assert (only(project).state, only(project).changed) == (OLDER, [])
 
 
@@ -128,12 +128,12 @@ def test_dvc_decides_of_what_stages_write(project: Path, monkeypatch) -> None:
 def test_table_and_json_say_the_same(project: Path) -> None:
     write(project, "validation/a.json", code={"pipeline/simulator": "0123456789ab"}, met=True)
     write(project, "validation/b.json", met=False)
-    found = listed(project, outdated, project)
-    lines = shown(found).splitlines()
+    committed = listed(project, outdated, project)
+    lines = shown(committed).splitlines()
     assert lines[1].split() == ["reports/validation/a.json", "0123456789ab", *OLDER.split(), "met"]
     assert lines[2].endswith(f"{UNKNOWN}  not met")
     assert lines[-1] == "0 of 2 are of today's code, 1 of older code; 1 do not meet what they ask"
-    first, second = json.loads(as_json(found))["figures"]
+    first, second = json.loads(as_json(committed))["figures"]
     assert first["state"] == OLDER and first["changed"] == ["pipeline/simulator"] and first["met"]
     assert (second["digest"], second["met"]) == (None, False)
 

@@ -112,9 +112,10 @@ def test_a_command_is_struck_and_what_lives_on_is_a_fault(tmp_path: Path, monkey
     monkeypatch.setattr(strike, "MEAN", 0.5)
     monkeypatch.setattr(strike, "PROMPT", 0.2)
     monkeypatch.setattr(strike, "VICTIMS", ("command",))
-    one = strike.struck(Sleeper(tmp_path), 0, 3, 1)
-    assert one["status"] == -signal.SIGKILL and [k["hit"] for k in one["kills"]] == ["the command"]
-    assert len(one["faults"]) == 1 and "lives 0.2 s later" in one["faults"][0]  # its stage
+    result = strike.struck(Sleeper(tmp_path), 0, 3, 1)
+    assert result["status"] == -signal.SIGKILL
+    assert [k["hit"] for k in result["kills"]] == ["the command"]
+    assert len(result["faults"]) == 1 and "lives 0.2 s later" in result["faults"][0]  # its stage
     assert not Sleeper(tmp_path).run.alive()
 
 
@@ -156,8 +157,8 @@ def test_a_command_that_is_quiet_about_a_full_disk_is_a_fault(disk: Path, monkey
     quiet.code = "raise SystemExit(1)"
     assert "status 1" in full_disk.filled(quiet, 0, 1, True)["faults"][0]
     quiet.code = "import sys, time; time.sleep(1); sys.exit('error: a: No space left on device')"
-    one = full_disk.filled(quiet, 0, 1, True)
-    assert one["faults"] == [] and one["said"] == "error: a: No space left on device"
+    result = full_disk.filled(quiet, 0, 1, True)
+    assert result["faults"] == [] and result["said"] == "error: a: No space left on device"
     assert not (disk / "ballast").exists()
 
 
@@ -207,9 +208,9 @@ def test_disturbing_goes_on_where_it_was_and_ends_well(tmp_path: Path, monkeypat
         other.lines[-1] = other.lines[-1] | {check: False}
         assert not report(other, 5, 0, EXPECTED, names)["met"], check
     lines.lines[0]["faults"].append("lives on")
-    found = report(lines, 5, 0, EXPECTED, names)
-    assert not found["met"] and found["figures"]["faults"][0]["fault"] == "lives on"
-    assert found["figures"]["hit"] == {"flow": 5}
+    summary = report(lines, 5, 0, EXPECTED, names)
+    assert not summary["met"] and summary["figures"]["faults"][0]["fault"] == "lives on"
+    assert summary["figures"]["hit"] == {"flow": 5}
 
 
 def test_kills_are_shared_out_evenly() -> None:
@@ -218,8 +219,8 @@ def test_kills_are_shared_out_evenly() -> None:
 
 
 def test_the_docs_say_what_was_counted() -> None:
-    found = json.loads((ROOT / "reports/validation/kills.json").read_text(encoding="utf-8"))
-    counts = found["figures"]
+    summary = json.loads((ROOT / "reports/validation/kills.json").read_text(encoding="utf-8"))
+    counts = summary["figures"]
     page = " ".join((ROOT / "docs/flow.md").read_text(encoding="utf-8").split())
     message = (
         f"{counts['kills']} kills at random moments over `dvc repro`, `sling flow`, `sling fit`"
@@ -230,5 +231,5 @@ def test_the_docs_say_what_was_counted() -> None:
     left = [
         count for count in counts["rounds"] if not (count["no_temporaries"] and count["no_locks"])
     ]
-    assert found["met"] is not bool(left or counts["faults"])
-    assert ("Two things were amiss there" in page) is not found["met"]
+    assert summary["met"] is not bool(left or counts["faults"])
+    assert ("Two things were amiss there" in page) is not summary["met"]

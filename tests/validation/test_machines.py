@@ -63,8 +63,8 @@ def test_the_same_inputs_give_the_same_theta_with_other_threads(
     monkeypatch.setenv("SLING_WORKERS", "1")
     again = machines.measure([BAND], project, "cpu")
     for content in (measured, again):
-        for one in content["bands"][BAND].values():
-            one["seconds"] = 0
+        for result in content["bands"][BAND].values():
+            result["seconds"] = 0
     assert again == measured
     ours, paper = (measured["bands"][BAND][method] for method in (OURS, PAPER))
     assert len(paper["theta"]) == 5 and len(ours["theta"]) == 12
@@ -110,8 +110,8 @@ ABOUT = {
 
 def summary(ours: list, paper: list = (1.5, 2.0), **more) -> dict:
     """A machine's JSON with landings."""
-    about = {"theta": {"youngs_modulus": 2e5}, "loss": 0.4, "seconds": 1.0}
-    methods = {OURS: about | {"landing": ours}, PAPER: about | {"landing": list(paper)}}
+    result = {"theta": {"youngs_modulus": 2e5}, "loss": 0.4, "seconds": 1.0}
+    methods = {OURS: result | {"landing": ours}, PAPER: result | {"landing": list(paper)}}
     return ABOUT | {"bands": {BAND: methods}} | more
 
 
@@ -209,5 +209,7 @@ COMMITTED = sorted((ROOT / FOLDER).glob("*.json"))
 
 @pytest.mark.skipif(len(COMMITTED) < 2, reason="fewer than two machines have been measured")
 def test_committed_machines_agree() -> None:
-    lines, met = machines.compared({one.stem: read_json(one, MachineReport) for one in COMMITTED})
+    lines, met = machines.compared(
+        {path.stem: read_json(path, MachineReport) for path in COMMITTED}
+    )
     assert met, "\n".join(lines)

@@ -101,7 +101,7 @@ def test_only_what_is_not_done_is_shared_out() -> None:
 @pytest.mark.parametrize("end", ["hang", "exit", "between"])
 def test_a_process_that_ends_too_early_names_its_recording(tmp_path, monkeypatch, end) -> None:
     """By another program in the place of the one that reads recordings."""
-    about = {"family": "ros2", "container": "lz4"}
+    case = {"family": "ros2", "container": "lz4"}
     (tmp_path / "sitecustomize.py").write_text(
         f"""\
 import faulthandler, json, os, signal, sys
@@ -110,7 +110,7 @@ if "validation.campaigns.outcomes" in sys.orig_argv:
     for seed in range(first, end):
         if seed == 4 and {end!r} == "between":
             os._exit(3)
-        print(json.dumps(dict({about!r}, seed=seed)), flush=True)
+        print(json.dumps(dict({case!r}, seed=seed)), flush=True)
         if seed == 4 and {end!r} == "hang":
             faulthandler.register(signal.SIGPROF, chain=True)
             signal.setitimer(signal.ITIMER_PROF, 0.2)
@@ -118,15 +118,15 @@ if "validation.campaigns.outcomes" in sys.orig_argv:
                 pass
         if seed == 4:
             os._exit(3)
-        print(json.dumps(dict({about!r}, seed=seed, outcome="same episode", s=0, bytes=0)),
+        print(json.dumps(dict({case!r}, seed=seed, outcome="same episode", s=0, bytes=0)),
               flush=True)
     os._exit(0)
 """
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    found = list(mutations._results(tmp_path, *about.values(), 2, 7))
-    assert [one["seed"] for one in found] == [2, 3, 4, 5, 6]
-    (fault,) = mutations.faults(found)
+    results = list(mutations._results(tmp_path, *case.values(), 2, 7))
+    assert [result["seed"] for result in results] == [2, 3, 4, 5, 6]
+    (fault,) = mutations.faults(results)
     assert fault["seed"] == 4 and json.dumps(fault)
     assert ("sitecustomize.py" in fault["words"]) == (end == "hang")
     assert ("before it began" in fault["words"]) == (end == "between")

@@ -29,8 +29,8 @@ def params(tmp_path, monkeypatch):
 def test_each_switch_trains_another_policy_and_is_kept(params, tmp_path, monkeypatch) -> None:
     lessons = [Lesson("band1", switch, 1) for switch in SWITCHES]
     results = [result(lesson, params, tmp_path, "de") for lesson in lessons]
-    assert len({tuple(one["error_m"]) for one in results}) == len(SWITCHES) == 5
-    assert {one["switch"]: one["std"] == results[0]["std"] for one in results} == {
+    assert len({tuple(row["error_m"]) for row in results}) == len(SWITCHES) == 5
+    assert {row["switch"]: row["std"] == results[0]["std"] for row in results} == {
         "usual": True, "landings": True, "state": True, "exploration": False, "all": False
     }  # fmt: skip
     monkeypatch.setattr(campaign, "train", None)  # a second training would fail
@@ -43,11 +43,11 @@ def test_each_switch_trains_another_policy_and_is_kept(params, tmp_path, monkeyp
 
 def test_a_target_out_of_reach_is_no_landing(params, tmp_path) -> None:
     weak = params.setup.model_copy(update={"max_force": 1e-3})
-    one = result(
+    row = result(
         Lesson("band1", "usual", 1), params.model_copy(update={"setup": weak}), tmp_path, "de"
     )
-    assert one["error_m"] == [None] * 3 and one["range_mean_error_m"] is None
-    figures = summary([one])["band1"]["usual"]
+    assert row["error_m"] == [None] * 3 and row["range_mean_error_m"] is None
+    figures = summary([row])["band1"]["usual"]
     assert figures["miss_cm"]["mean"] is None and figures["range_failures"] == 256
 
 

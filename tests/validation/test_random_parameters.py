@@ -33,7 +33,7 @@ def test_the_sets_fill_the_box_of_each_law(bench) -> None:
 
 def test_what_is_not_finite_and_not_marked_is_counted(bench, monkeypatch) -> None:
     sound = random_parameters.surveyed(bench, NEO_HOOKEAN, 8)
-    assert [one["not_finite"] for one in sound.values()] == [0, 0, 0]
+    assert [survey["not_finite"] for survey in sound.values()] == [0, 0, 0]
     true = robustness.interact
 
     def broken(*args, **options):
@@ -41,5 +41,5 @@ def test_what_is_not_finite_and_not_marked_is_counted(bench, monkeypatch) -> Non
         return replace(done, force=np.nan * done.force, failure=[None] * len(done.failure))
 
     monkeypatch.setattr(robustness, "interact", broken)
-    found = random_parameters.surveyed(bench, NEO_HOOKEAN, 8)
-    assert [found[name]["not_finite"] for name in ("held_fast", "default_grip")] == [4, 4]
+    surveys = random_parameters.surveyed(bench, NEO_HOOKEAN, 8)
+    assert [surveys[name]["not_finite"] for name in ("held_fast", "default_grip")] == [4, 4]

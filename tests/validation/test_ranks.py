@@ -35,7 +35,7 @@ def test_a_right_posterior_has_even_ranks() -> None:
 
 def test_a_wrong_one_is_told_by_their_form() -> None:
     narrow, wide, off = ranks(width=0.5), ranks(width=2.0), ranks(shift=0.5)
-    assert max(one["p"] for one in (narrow, wide, off)) < 1e-3
+    assert max(figures["p"] for figures in (narrow, wide, off)) < 1e-3
     assert narrow["coverage"] < 0.7 and narrow["spread"] > 1.2
     assert wide["coverage"] > 0.97 and wide["spread"] < 0.8
     assert off["mean"] < 0.4

@@ -23,8 +23,8 @@ def test_the_band_of_the_jacobian_holds_all_of_it(string) -> None:
     y = string.state(bent_at(string, np.array([0.0, -0.3, -0.1])))
     y[1:-1] += np.random.default_rng(0).normal(0, 1e-3, y[1:-1].shape)
     data, flat = (string.band, ABSENT), y.ravel()
-    about = campaign.banded(flat.size, data)
-    packed, reach = about["jac"](0.0, flat), about["uband"]
+    options = campaign.banded(flat.size, data)
+    packed, reach = options["jac"](0.0, flat), options["uband"]
 
     def rates(at: np.ndarray) -> np.ndarray:
         out = np.empty_like(at)
@@ -37,8 +37,8 @@ def test_the_band_of_the_jacobian_holds_all_of_it(string) -> None:
         dense = (rates(nudged) - rates(flat)) / forces.NUDGE
         rows = np.arange(flat.size)
         inside = abs(rows - column) <= reach
-        found = packed[(rows - column + reach)[inside], column]
-        np.testing.assert_allclose(found, dense[inside], atol=1e-6 * np.abs(dense).max() + 1e-9)
+        values = packed[(rows - column + reach)[inside], column]
+        np.testing.assert_allclose(values, dense[inside], atol=1e-6 * np.abs(dense).max() + 1e-9)
         assert not dense[~inside].any()
 
 
@@ -64,13 +64,14 @@ def test_both_follow_a_swing_alike(string) -> None:
 def test_what_differs_is_told_by_when_it_does() -> None:
     seen = np.array([0.0, 1.0, 2.0])
     zeros = np.zeros((3, 4, 3))
-    one = Interaction(np.ones((5, 3)), np.zeros((5, 3)), np.zeros((5, 3)), seen, zeros, 1.5)
+    first = Interaction(np.ones((5, 3)), np.zeros((5, 3)), np.zeros((5, 3)), seen, zeros, 1.5)
     lines = zeros.copy()
     lines[1, 2, 0], lines[2, 0, 1] = 0.1, 0.5
     force = np.ones((5, 3))
     force[3, 0] += 0.25
-    other = replace(one, lines=lines, force=force, slip_time=1.6)
-    found = campaign.apart(one, other)
-    assert found["nodes_held_m"] == pytest.approx(0.1)
-    assert found["nodes_swinging_m"] == pytest.approx(0.5)
-    assert found["force_n"] == pytest.approx(0.25) and found["slip_s"] == pytest.approx(0.1)
+    second = replace(first, lines=lines, force=force, slip_time=1.6)
+    differences = campaign.apart(first, second)
+    assert differences["nodes_held_m"] == pytest.approx(0.1)
+    assert differences["nodes_swinging_m"] == pytest.approx(0.5)
+    assert differences["force_n"] == pytest.approx(0.25)
+    assert differences["slip_s"] == pytest.approx(0.1)

@@ -47,7 +47,7 @@ def test_a_run_that_was_killed_goes_on(tmp_path) -> None:
     }
     run(None, [Square(2), Square(3)], ResultLines(path), 1)  # nothing is left to do
     some = ResultLines(path).among([Square(3), Square(5), Square(2)])
-    assert [one["number"] for one in some] == [3, 2]
+    assert [row["number"] for row in some] == [3, 2]
     assert ResultLines(path).where(number=-1) == [{"number": -1, "failed": "no square"}]
 
 

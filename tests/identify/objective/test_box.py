@@ -66,8 +66,8 @@ def test_there_and_back_as_parameters() -> None:
     box = SearchBox.of(load(DEFAULTS).parameters, fixed={"poissons_ratio": 0.45, "air_drag": 0.7})
     assert box.free == tuple(name for name in THETA if name != "poissons_ratio")
     unit = box.fill(np.full((2, 4), [[0.25], [0.75]]))
-    found = box.parameters(box.to_physical(unit))
-    np.testing.assert_allclose(found.column("poissons_ratio"), 0.45, rtol=1e-12)
-    assert found.column("air_drag").tolist() == [0.7, 0.7]
-    assert found.column("returned_share").tolist() == [1.0, 1.0]
-    np.testing.assert_allclose(box.unit_of(found), unit, atol=1e-12)
+    parameters = box.parameters(box.to_physical(unit))
+    np.testing.assert_allclose(parameters.column("poissons_ratio"), 0.45, rtol=1e-12)
+    assert parameters.column("air_drag").tolist() == [0.7, 0.7]
+    assert parameters.column("returned_share").tolist() == [1.0, 1.0]
+    np.testing.assert_allclose(box.unit_of(parameters), unit, atol=1e-12)

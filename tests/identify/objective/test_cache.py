@@ -83,8 +83,8 @@ def remembered(tmp_path: Path):
     def evaluate(units: list[np.ndarray], stamp: str = "x", **more) -> tuple[int, list[Evaluation]]:
         inner = bowl(fails=fails, **more)
         cache = EvaluationCache(inner, tmp_path / "memory", stamp)
-        found = [cache(unit) for unit in units]
-        return inner.count, found
+        evaluations = [cache(unit) for unit in units]
+        return inner.count, evaluations
 
     return evaluate
 
@@ -95,12 +95,12 @@ def test_what_was_simulated_is_recalled(remembered) -> None:
     assert count == 2
     count, again = remembered(batches(0.3, 0.2, 0.1))
     assert count == 1
-    for one, other in zip(first, again[:0:-1], strict=True):
+    for evaluation, other in zip(first, again[:0:-1], strict=True):
         for name in ("unit", "theta", "total"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-        assert one.failure == other.failure == [None, "no"]
-        np.testing.assert_array_equal(one.terms["geom"], other.terms["geom"])
-        assert (one.seconds, other.seconds) == (1.0, 0.0)
+            np.testing.assert_array_equal(getattr(evaluation, name), getattr(other, name))
+        assert evaluation.failure == other.failure == [None, "no"]
+        np.testing.assert_array_equal(evaluation.terms["geom"], other.terms["geom"])
+        assert (evaluation.seconds, other.seconds) == (1.0, 0.0)
 
 
 def test_totals_are_recomputed_by_weights(remembered) -> None:
@@ -136,9 +136,9 @@ def test_a_damaged_batch_never_gives_other_losses(
     for byte in range(place, min(place + length, len(whole))):
         whole[byte] ^= flip
     file.write_bytes(whole)
-    _, (found,) = remembered(batches(0.1))
-    np.testing.assert_array_equal(found.total, expected.total)
-    assert found.failure == expected.failure
+    _, (evaluation,) = remembered(batches(0.1))
+    np.testing.assert_array_equal(evaluation.total, expected.total)
+    assert evaluation.failure == expected.failure
 
 
 def test_a_memory_that_another_run_throws_away_stops_nobody(
@@ -152,8 +152,8 @@ def test_a_memory_that_another_run_throws_away_stops_nobody(
         remembered([], "y")
 
     monkeypatch.setattr(np, "savez", interrupted)
-    count, found = remembered(batches(0.1, 0.2))
-    assert (count, len(found)) == (2, 2)
+    count, evaluations = remembered(batches(0.1, 0.2))
+    assert (count, len(evaluations)) == (2, 2)
     monkeypatch.undo()
     assert remembered(batches(0.1, 0.2))[0] == 2
 
@@ -163,9 +163,9 @@ def test_runs_side_by_side_share_a_memory(remembered, tmp_path: Path) -> None:
     firsts = [batches(*np.random.default_rng(seed).permutation(20) / 50) for seed in range(4)]
     with ThreadPoolExecutor(4) as pool:
         runs = list(pool.map(remembered, firsts))
-    for units, (_, found) in zip(firsts, runs, strict=True):
-        for unit, one in zip(units, found, strict=True):
-            np.testing.assert_array_equal(one.total, bowl(fails=fails)(unit).total)
+    for units, (_, evaluations) in zip(firsts, runs, strict=True):
+        for unit, evaluation in zip(units, evaluations, strict=True):
+            np.testing.assert_array_equal(evaluation.total, bowl(fails=fails)(unit).total)
     assert len(list((tmp_path / "memory" / "x").iterdir())) == 20
 
 
@@ -214,12 +214,12 @@ def test_a_loss_that_is_not_finite_is_so_by_the_weights(tmp_path: Path) -> None:
     for folder, names in (("a", ("geom", "work", "geom")), ("b", ("work", "geom", "work"))):
         for name in names:
             inner = Evaluator(episode, toy.SLING, Loss(**{name: 1.0}), box, simulate=simulate)
-            expected, found = inner(unit), EvaluationCache(inner, tmp_path / folder, "x")(unit)
-            assert found.failure == expected.failure
-            assert (NOT_FINITE in found.failure) == (name == "work")
-            np.testing.assert_array_equal(found.total, expected.total)
+            expected, evaluation = inner(unit), EvaluationCache(inner, tmp_path / folder, "x")(unit)
+            assert evaluation.failure == expected.failure
+            assert (NOT_FINITE in evaluation.failure) == (name == "work")
+            np.testing.assert_array_equal(evaluation.total, expected.total)
             for term in expected.terms:
-                np.testing.assert_array_equal(found.terms[term], expected.terms[term])
+                np.testing.assert_array_equal(evaluation.terms[term], expected.terms[term])
 
 
 def test_the_fingerprint_covers_contents_and_sources(tmp_path: Path) -> None:

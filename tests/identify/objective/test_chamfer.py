@@ -46,8 +46,8 @@ def test_equals_the_reference() -> None:
     ]
     for both in (True, False):
         expected = [[reference(c, line[k], both) for k, c in enumerate(clouds)] for line in lines]
-        found = chamfer_of(clouds, symmetric=both)(lines)
-        np.testing.assert_allclose(found, expected, rtol=2e-5, atol=1e-7)
+        distances = chamfer_of(clouds, symmetric=both)(lines)
+        np.testing.assert_allclose(distances, expected, rtol=2e-5, atol=1e-7)
 
 
 @pytest.mark.parametrize("lanes", LANES.values())
@@ -68,11 +68,11 @@ def test_what_is_skipped_changes_no_bit(lanes: int, monkeypatch: pytest.MonkeyPa
     lines[8, :, ::2] = lines[8, :, 1::2].mean(axis=1, keepdims=True)
     lines[9], lines[10, :, 7], lines[11, :, 20] = np.nan, np.nan, np.inf
     for both in (True, False):
-        found, whole = (
+        distances, whole = (
             chamfer_of(clouds, symmetric=both, culled=culled)(lines) for culled in (True, False)
         )
-        np.testing.assert_array_equal(found, whole)
-        assert np.isfinite(np.delete(found[:9], 8, axis=1)).all()
+        np.testing.assert_array_equal(distances, whole)
+        assert np.isfinite(np.delete(distances[:9], 8, axis=1)).all()
 
 
 def test_a_stretched_band_is_thinner() -> None:

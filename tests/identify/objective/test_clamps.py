@@ -36,10 +36,10 @@ def episode(sling: ClampedBand) -> Episode:
 
 
 def test_angle_and_rigidity_are_found(sling, episode):
-    found = calibrate_clamps(PARAMS, sling, episode, workers=2)
-    assert found.clamp_angle_deg == pytest.approx(15.0, abs=5.0)
-    assert found.flexural_rigidity == pytest.approx(RIGIDITY * SOLID, rel=0.25)
-    assert found.loss["fitted"] < found.loss["solid_and_vertical"]
+    calibration = calibrate_clamps(PARAMS, sling, episode, workers=2)
+    assert calibration.clamp_angle_deg == pytest.approx(15.0, abs=5.0)
+    assert calibration.flexural_rigidity == pytest.approx(RIGIDITY * SOLID, rel=0.25)
+    assert calibration.loss["fitted"] < calibration.loss["solid_and_vertical"]
 
 
 def test_the_slack_part_ends_before_the_band_is_taut(sling, episode):

@@ -48,19 +48,22 @@ def test_equals_all_pairs_of_scipy_and_open3d() -> None:
     lines = lines.astype(np.float32)
     clouds = [rng.normal(0, 0.1, (size, 3)).astype(np.float32) for size in sizes]
     rest = graded()
-    found = CloudDistance(clouds, ASIDE, radius=RADIUS, rest_length=rest)(lines)
-    for line, row in zip(lines, found, strict=True):
+    distances = CloudDistance(clouds, ASIDE, radius=RADIUS, rest_length=rest)(lines)
+    for line, row in zip(lines, distances, strict=True):
         for k, cloud in enumerate(clouds):
             simulated = vertices(line[k], rest, ASIDE)
             assert simulated.shape == (RINGS * AROUND, 3)
             pairs = cdist(cloud, simulated)
             expected = (pairs.min(0).mean() + pairs.min(1).mean()) / 2
             assert row[k] == pytest.approx(expected, rel=2e-5)
-            one, other = (
+            recorded, mesh = (
                 open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points.astype(float)))
                 for points in (cloud, simulated)
             )
-            both = one.compute_point_cloud_distance(other), other.compute_point_cloud_distance(one)
+            both = (
+                recorded.compute_point_cloud_distance(mesh),
+                mesh.compute_point_cloud_distance(recorded),
+            )
             assert row[k] == pytest.approx((np.mean(both[0]) + np.mean(both[1])) / 2, rel=2e-5)
 
 
@@ -80,21 +83,21 @@ def test_what_is_skipped_changes_no_bit(lanes: int, monkeypatch: pytest.MonkeyPa
         line += rng.normal(0, spread, (1, 25, 3))
     lines[7] *= 1e-3
     lines[8, :, ::2] = lines[8, :, 1::2].mean(axis=1, keepdims=True)
-    found, whole = (
-        CloudDistance(clouds, ASIDE, culled=one, **TUBE)(lines) for one in (True, False)
+    distances, whole = (
+        CloudDistance(clouds, ASIDE, culled=culled, **TUBE)(lines) for culled in (True, False)
     )
-    np.testing.assert_array_equal(found, whole)
-    assert np.isfinite(np.delete(found, 8, axis=1)).all()
+    np.testing.assert_array_equal(distances, whole)
+    assert np.isfinite(np.delete(distances, 8, axis=1)).all()
 
 
 def test_the_side_that_no_camera_sees_counts() -> None:
     """A cloud on the ridge: a vertex at the angle a is 2 R sin(a / 2) away."""
-    found = CloudDistance([facing(20_000)], CAMERA, **TUBE)(straight(1)[None])[0, 0]
+    distance = CloudDistance([facing(20_000)], CAMERA, **TUBE)(straight(1)[None])[0, 0]
     angle = 2 * np.pi * np.arange(AROUND) / AROUND
     back, there = (2 * RADIUS * np.abs(np.sin(angle / 2))).mean(), LENGTH / RINGS / 4
-    assert found == pytest.approx((back + there) / 2, rel=0.01)
+    assert distance == pytest.approx((back + there) / 2, rel=0.01)
     seen = Chamfer([facing(20_000)], CAMERA, **TUBE)(straight(1)[None])[0, 0]
-    assert seen < 0.1 * found
+    assert seen < 0.1 * distance
 
 
 def test_a_stretched_band_is_thinner() -> None:
@@ -120,10 +123,10 @@ def test_the_text_compiles_for_a_gpu(tmp_path) -> None:
 def test_empty_clouds_and_broken_rollouts_are_no_number_and_the_others_stay() -> None:
     lines = np.tile(straight(3), (3, 1, 1, 1))
     lines[1, 2, 7] = np.nan
-    found = CloudDistance([facing(), np.zeros((0, 3)), facing()], CAMERA, **TUBE)(lines)
-    assert np.isnan(found[:, 1]).all() and np.isnan(found[1, 2])
-    np.testing.assert_array_equal(found[0, [0, 2]], found[2, [0, 2]])
-    assert found[1, 0] == found[0, 0] == found[0, 2]
+    distances = CloudDistance([facing(), np.zeros((0, 3)), facing()], CAMERA, **TUBE)(lines)
+    assert np.isnan(distances[:, 1]).all() and np.isnan(distances[1, 2])
+    np.testing.assert_array_equal(distances[0, [0, 2]], distances[2, [0, 2]])
+    assert distances[1, 0] == distances[0, 0] == distances[0, 2]
 
 
 def test_a_loss_takes_it_wherever_the_rollouts_are() -> None:
@@ -139,12 +142,12 @@ def test_a_loss_takes_it_wherever_the_rollouts_are() -> None:
     there = type(simulated)(**vars(simulated))
     there.force = wp.array(simulated.force.astype(np.float32), device="cpu")
     there.center_line = wp.array(simulated.center_line, device="cpu")
-    expected, found = seen.terms(simulated), clouds.terms(simulated)
+    expected, terms = seen.terms(simulated), clouds.terms(simulated)
     for name in ("force", "work"):
-        np.testing.assert_array_equal(found[name], expected[name])
-    assert (found["geom"] > 1.2 * expected["geom"]).all()
+        np.testing.assert_array_equal(terms[name], expected[name])
+    assert (terms["geom"] > 1.2 * expected["geom"]).all()
     for name, values in clouds.terms(there).items():
-        np.testing.assert_allclose(values, found[name], rtol=1e-6)
+        np.testing.assert_allclose(values, terms[name], rtol=1e-6)
 
 
 def test_a_perfect_place_costs_least() -> None:

@@ -69,19 +69,19 @@ def loss_of(episode, **options) -> EpisodeLoss:
 def test_terms_are_those_of_numpy(options: dict) -> None:
     episode, rollouts = recoiling()
     loss = loss_of(episode, **options)
-    expected, found = loss.terms(rollouts), loss.terms(there(rollouts))
+    expected, terms = loss.terms(rollouts), loss.terms(there(rollouts))
     assert min(values.min() for values in expected.values()) > 1e-3
     for name in TERMS:
-        np.testing.assert_allclose(found[name], expected[name], rtol=1e-9)
+        np.testing.assert_allclose(terms[name], expected[name], rtol=1e-9)
 
 
 def test_empty_frames_are_left_out() -> None:
     episode, rollouts = recoiling()
     clouds = [*episode.clouds[:1], *4 * [np.zeros((0, 3))], *episode.clouds[5:]]
     loss = loss_of(replace(episode, clouds=clouds))
-    expected, found = loss.terms(rollouts), loss.terms(there(rollouts))
+    expected, terms = loss.terms(rollouts), loss.terms(there(rollouts))
     assert np.isfinite(expected["geom"]).all()
-    np.testing.assert_allclose(found["geom"], expected["geom"], rtol=1e-9)
+    np.testing.assert_allclose(terms["geom"], expected["geom"], rtol=1e-9)
 
 
 def test_a_broken_rollout_breaks_no_other() -> None:
@@ -100,9 +100,9 @@ def test_another_schedule_brings_its_own_filter() -> None:
     episode, rollouts = recoiling()
     loss, later = loss_of(episode), type(rollouts)(**vars(rollouts))
     later.times = rollouts.times + np.linspace(0, 0.02, len(rollouts.times))
-    for one in (rollouts, later, rollouts):
-        for name, values in loss.terms(there(one)).items():
-            np.testing.assert_allclose(values, loss.terms(one)[name], rtol=1e-9)
+    for batch in (rollouts, later, rollouts):
+        for name, values in loss.terms(there(batch)).items():
+            np.testing.assert_allclose(values, loss.terms(batch)[name], rtol=1e-9)
 
 
 def test_the_text_compiles_for_a_gpu(tmp_path) -> None:
@@ -138,9 +138,9 @@ def test_terms_of_a_gpu_are_those_of_the_cpu(chamfer: str) -> None:
         force=wp.array(np.asarray(rollouts.force, np.float32), device="cuda:0"),
         center_line=wp.array(rollouts.center_line, device="cuda:0"),
     )
-    expected, found = loss.terms(rollouts), loss.terms(moved)
+    expected, terms = loss.terms(rollouts), loss.terms(moved)
     for name in TERMS:
-        np.testing.assert_allclose(found[name], expected[name], rtol=1e-4)
+        np.testing.assert_allclose(terms[name], expected[name], rtol=1e-4)
 
     whole = Evaluator(episode, sling, loss, space, devices=("cuda:0",))(unit)
     some = Evaluator(episode, sling, loss, space, devices=("cuda:0",))(unit[7:10])

@@ -26,7 +26,7 @@ def test_an_installed_engine_is_found_by_its_name(monkeypatch) -> None:
     """As pyproject.toml offers it; an installation from before that says what to do."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     offered = project["entry-points"][engine.GROUP]
-    points = EntryPoints(EntryPoint(*one, engine.GROUP) for one in offered.items())
+    points = EntryPoints(EntryPoint(*pair, engine.GROUP) for pair in offered.items())
     monkeypatch.setattr(engine, "entry_points", points.select)
     assert [*offered] == [name for name in ENGINES if name != OUR_ENGINE]
     assert simulate_of("physx") is rollouts.simulate
@@ -67,6 +67,6 @@ def test_another_engine_changes_the_loss_and_gets_whole_batches(monkeypatch) -> 
 
 
 def test_its_folder_is_among_the_sources() -> None:
-    assert [one.name for one in sources_of("tests.identify.objective.toy_engine:simulate")] == [
-        "objective"
-    ]
+    assert [
+        source.name for source in sources_of("tests.identify.objective.toy_engine:simulate")
+    ] == ["objective"]

@@ -50,26 +50,28 @@ def evaluator(workers: int = 1, **options) -> Evaluator:
 def test_losses_of_a_batch() -> None:
     """Physical values in, weighted sum out; the unit cube is what was asked."""
     unit = np.array([[0.5, 0.5], [0.0, 0.0]])
-    found = evaluator(1)(unit)
-    np.testing.assert_array_equal(found.unit, unit)
-    np.testing.assert_allclose(found.theta, [[0.005, 1.0], [0.0, 0.1]])
-    np.testing.assert_allclose(found.terms["geom"], [0.5, 0.0], atol=0.01)
-    np.testing.assert_allclose(found.terms["force"], [1.0, 0.1])
-    np.testing.assert_allclose(found.total, found.terms["geom"] + 0.5 * found.terms["force"])
-    assert found.failure == [None, None]
+    evaluation = evaluator(1)(unit)
+    np.testing.assert_array_equal(evaluation.unit, unit)
+    np.testing.assert_allclose(evaluation.theta, [[0.005, 1.0], [0.0, 0.1]])
+    np.testing.assert_allclose(evaluation.terms["geom"], [0.5, 0.0], atol=0.01)
+    np.testing.assert_allclose(evaluation.terms["force"], [1.0, 0.1])
+    np.testing.assert_allclose(
+        evaluation.total, evaluation.terms["geom"] + 0.5 * evaluation.terms["force"]
+    )
+    assert evaluation.failure == [None, None]
 
 
 def test_the_number_of_workers_and_devices_changes_nothing() -> None:
     """Rows in their order, failures too; some devices may find nothing to do."""
     for count, workers, devices in ((67, 3, 1), (67, 1, 2), (17, 1, 2), (2, 1, 3), (1, 1, 3)):
         unit = np.random.default_rng(1).random((count, 2))
-        one, several = evaluator()(unit), evaluator(workers, devices=["cpu"] * devices)(unit)
-        np.testing.assert_array_equal(one.theta, several.theta)
-        np.testing.assert_array_equal(one.total, several.total)
-        assert one.failure == several.failure
+        serial, several = evaluator()(unit), evaluator(workers, devices=["cpu"] * devices)(unit)
+        np.testing.assert_array_equal(serial.theta, several.theta)
+        np.testing.assert_array_equal(serial.total, several.total)
+        assert serial.failure == several.failure
         for name in TERMS:
-            np.testing.assert_array_equal(one.terms[name], several.terms[name])
-        assert count < 67 or 0 < sum(reason is not None for reason in one.failure) < count
+            np.testing.assert_array_equal(serial.terms[name], several.terms[name])
+        assert count < 67 or 0 < sum(reason is not None for reason in serial.failure) < count
 
 
 def test_devices_share_a_batch_evenly_and_at_once() -> None:
@@ -81,8 +83,8 @@ def test_devices_share_a_batch_evenly_and_at_once() -> None:
         both.wait()
         return simulate(sling, episode, parameters, "cpu")
 
-    found = evaluator(devices=("cpu", "cpu:1"), simulate=simulate_on)(np.full((11, 2), 0.5))
-    assert requested == {"cpu": 6, "cpu:1": 5} and np.isfinite(found.total).all()
+    evaluation = evaluator(devices=("cpu", "cpu:1"), simulate=simulate_on)(np.full((11, 2), 0.5))
+    assert requested == {"cpu": 6, "cpu:1": 5} and np.isfinite(evaluation.total).all()
 
 
 def test_what_a_device_raises_is_raised() -> None:
@@ -103,20 +105,20 @@ def test_nor_does_either_where_a_law_adds_its_own_axes() -> None:
     unit[1, box.names.index("mooney_share")] += 0.1
     unit[2, box.names.index("relaxation")] += 0.1
     unit[:3] %= 1
-    found = []
+    evaluations = []
     loss = EpisodeLoss.of(PARAMS, "least_squares", recorded, sling)
     for workers, devices in ((1, ["cpu"]), (2, ["cpu"]), (1, ["cpu", "cpu"])):
         evaluate = Evaluator(recorded, sling, loss, box, workers=workers, devices=devices)
-        found.append(evaluate(unit))
-    assert found[0].failure == found[1].failure == found[2].failure
-    assert np.isfinite(found[0].total[:3]).all() and len(set(found[0].total[:3])) == 3
+        evaluations.append(evaluate(unit))
+    assert evaluations[0].failure == evaluations[1].failure == evaluations[2].failure
+    assert np.isfinite(evaluations[0].total[:3]).all() and len(set(evaluations[0].total[:3])) == 3
     for name in TERMS:
-        for other in found[1:]:
-            np.testing.assert_array_equal(found[0].terms[name], other.terms[name])
+        for other in evaluations[1:]:
+            np.testing.assert_array_equal(evaluations[0].terms[name], other.terms[name])
 
 
 def test_failures_are_infinite_and_have_a_reason() -> None:
-    found = evaluator(2)(np.array([[0.9, 0.5], [0.5, 0.999], [0.5, 0.5]]))
-    assert found.failure == ["too far", "the loss is not finite", None]
-    np.testing.assert_array_equal(np.isinf(found.total), [True, True, False])
-    assert np.isnan(found.terms["geom"][:2]).all()
+    evaluation = evaluator(2)(np.array([[0.9, 0.5], [0.5, 0.999], [0.5, 0.5]]))
+    assert evaluation.failure == ["too far", "the loss is not finite", None]
+    np.testing.assert_array_equal(np.isinf(evaluation.total), [True, True, False])
+    assert np.isnan(evaluation.terms["geom"][:2]).all()

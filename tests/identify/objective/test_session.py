@@ -94,9 +94,9 @@ def test_another_episode_starts_over(evaluators: list[Evaluate]) -> None:
 def test_all_episodes_of_a_band_come_in_their_order(evaluators: list[Evaluate]) -> None:
     for number in range(2, 12):  # by number, not by name
         toy.episode(release_time=1 + number / 100).save(Layout().episode("band1", number))
-    found = [episode.release_time for episode in session.load_episodes("band1")]
-    assert found[0] == session.load_episode("band1").release_time
-    assert found[1:] == [1 + number / 100 for number in range(2, 12)]
+    release_times = [episode.release_time for episode in session.load_episodes("band1")]
+    assert release_times[0] == session.load_episode("band1").release_time
+    assert release_times[1:] == [1 + number / 100 for number in range(2, 12)]
 
 
 def test_progress_says_how_far_it_is_and_what_was_recalled(

@@ -36,9 +36,9 @@ def test_its_gradient_is_the_functions(place: list[float], step: float) -> None:
     optimizer._steepest = optimizer._worst = np.inf
     optimizer.tell(value(requested))
     exact = 2 * MATRIX @ (np.array(place) - CENTRE)
-    found = optimizer._x[0].grad
+    gradient = optimizer._x[0].grad
     bound = step * np.diag(MATRIX) * (1 + 1e-6) + 1e-9
-    assert (np.abs(found.numpy() - exact) <= bound).all()
+    assert (np.abs(gradient.numpy() - exact) <= bound).all()
 
 
 def test_its_steps_are_torchs() -> None:

@@ -91,8 +91,8 @@ def test_greedy_takes_what_adds_most() -> None:
     chosen = greedy(samples, 0.3, 5)
     reached = np.full(40, 0.3)
     for place, candidate in enumerate(chosen):
-        left = [one for one in range(12) if one not in chosen[:place]]
-        gains = {one: np.maximum(samples[:, one], reached).mean() for one in left}
+        left = [index for index in range(12) if index not in chosen[:place]]
+        gains = {index: np.maximum(samples[:, index], reached).mean() for index in left}
         assert candidate == max(gains, key=gains.get)
         reached = np.maximum(reached, samples[:, candidate])
     mean, deviation, best = np.array([0.0, 0.4, 0.2]), np.array([1.0, 0.3, 0.6]), 0.5

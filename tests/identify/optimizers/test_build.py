@@ -21,25 +21,25 @@ OWN = "tests.identify.search.own:RandomSearch"
 def method(**more):
     """params.yaml's optimiser, and its method sling2sim2real with other keys."""
     params = parse(TEXT)
-    about = params.methods["sling2sim2real"].model_copy(update=more)
-    return about, params.optimizer
+    method_params = params.methods["sling2sim2real"].model_copy(update=more)
+    return method_params, params.optimizer
 
 
 def test_a_multistart_explores_as_differential_evolution_does() -> None:
     for search in ("multistart", "de"):
-        one = explorer(*method(search=search), 4, 60)
-        assert isinstance(one, Evolution)
-        np.testing.assert_array_equal(one.ask(), latin_hypercube(4, 20, 1))
+        evolution = explorer(*method(search=search), 4, 60)
+        assert isinstance(evolution, Evolution)
+        np.testing.assert_array_equal(evolution.ask(), latin_hypercube(4, 20, 1))
 
 
 def test_the_explorer_moves_as_params_say() -> None:
-    about, optimizer = method()
+    method_params, optimizer = method()
     still = optimizer.model_copy(update={"recombination": 0.0, "mutation": (0.0, 0.1)})
     second = []
     for settings in (optimizer, still):
-        one = explorer(about, settings, 4, 60)
-        one.tell(rosenbrock(one.ask()))
-        second.append(one.ask())
+        evolution = explorer(method_params, settings, 4, 60)
+        evolution.tell(rosenbrock(evolution.ask()))
+        second.append(evolution.ask())
     assert not np.array_equal(*second)
 
 
@@ -55,8 +55,8 @@ def test_a_class_beside_params_is_found(tmp_path: Path, monkeypatch: pytest.Monk
     (tmp_path / "beside_params.py").write_text(source)
     monkeypatch.setattr(sys, "path", [*sys.path])
     monkeypatch.chdir(tmp_path)
-    one = build("beside_params:Mine", 4, rollouts=60, seed=1, population=20)
-    assert one.ask().shape == (7, 4)
+    optimizer = build("beside_params:Mine", 4, rollouts=60, seed=1, population=20)
+    assert optimizer.ask().shape == (7, 4)
 
 
 REFUSED = (

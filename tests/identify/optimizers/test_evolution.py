@@ -17,7 +17,7 @@ from tests.identify.search.functions import NAMES, rosenbrock
 
 
 def threads() -> list[threading.Thread]:
-    return [one for one in threading.enumerate() if one.name == "differential evolution"]
+    return [thread for thread in threading.enumerate() if thread.name == "differential evolution"]
 
 
 def left() -> list[threading.Thread]:
@@ -63,11 +63,11 @@ def test_its_points_are_those_of_scipy(
         **shared,
     )
     rollouts = population * (generations + 1)
-    one = Evolution(dimension, rollouts=rollouts, seed=seed, population=population, **shared)
+    optimizer = Evolution(dimension, rollouts=rollouts, seed=seed, population=population, **shared)
     for unit in expected:
-        requested = one.ask()
+        requested = optimizer.ask()
         np.testing.assert_array_equal(requested, unit)
-        one.tell(((requested - 0.3) ** 2).sum(axis=1))
+        optimizer.tell(((requested - 0.3) ** 2).sum(axis=1))
 
 
 def test_its_first_generation_has_one_agent_in_each_stratum() -> None:
@@ -83,11 +83,11 @@ def small(population: int = 5, **more) -> Evolution:
 def test_no_thread_is_left() -> None:
     """Dropped before it was asked, in the middle, and after its budget."""
     for summary in (0, 1, 3):
-        one = small()
+        optimizer = small()
         for _ in range(summary):
-            one.tell(rosenbrock(one.ask()))
+            optimizer.tell(rosenbrock(optimizer.ask()))
         assert threads()
-        del one
+        del optimizer
         assert not left()
 
 
@@ -106,9 +106,9 @@ def test_what_scipy_raises_surfaces() -> None:
         small(mutation=(0.5, 7.0))
     with pytest.raises(ValueError, match="population supplied"):
         small(population=3).ask()
-    one = small()
+    optimizer = small()
     for _ in range(4):
-        one.tell(rosenbrock(one.ask()))
+        optimizer.tell(rosenbrock(optimizer.ask()))
     with pytest.raises(RuntimeError, match="beyond its budget"):
-        one.ask()
+        optimizer.ask()
     assert not left()

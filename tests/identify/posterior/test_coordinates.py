@@ -35,9 +35,9 @@ def test_there_and_back(part):
     """What a θ file's θ holds comes back; the rest is as expected."""
     phi = within(np.array(part))
     back = OURS.of(OURS.parameters(phi[None]))
-    own = len(OURS.names) - len(EXTRA)
-    np.testing.assert_allclose(back[:own], phi[:own], atol=1e-9)
-    np.testing.assert_array_equal(back[own:], OURS.expected[own:])
+    count = len(OURS.names) - len(EXTRA)
+    np.testing.assert_allclose(back[:count], phi[:count], atol=1e-9)
+    np.testing.assert_array_equal(back[count:], OURS.expected[count:])
 
 
 def test_the_loss_factor_is_what_a_wave_loses_along_the_band():
@@ -82,16 +82,16 @@ def test_a_start_outside_comes_to_the_bounds():
 
 
 def test_narrower_bounds_and_other_fixed_values_of_the_method_count():
-    about = PARAMS.methods[METHOD]
-    fixed = about.fixed | {"damping_scale": 0.3}
-    bounds = about.bounds | {"youngs_modulus": (2e5, 4e5)}
-    mine = about.model_copy(update={"fixed": fixed, "bounds": bounds})
+    method = PARAMS.methods[METHOD]
+    fixed = method.fixed | {"damping_scale": 0.3}
+    bounds = method.bounds | {"youngs_modulus": (2e5, 4e5)}
+    mine = method.model_copy(update={"fixed": fixed, "bounds": bounds})
     params = PARAMS.model_copy(update={"methods": PARAMS.methods | {METHOD: mine}})
     other = Coordinates.of_method(params, METHOD, SLING)
     assert (other.low[0], other.high[0]) == pytest.approx(tuple(np.log([2e5, 4e5])))
     phi = other.expected.copy()
-    one, two = (each.parameters(phi[None]) for each in (OURS, other))
-    twice = two.column("elasticity_damping")[0] / one.column("elasticity_damping")[0]
+    ours, theirs = (each.parameters(phi[None]) for each in (OURS, other))
+    twice = theirs.column("elasticity_damping")[0] / ours.column("elasticity_damping")[0]
     assert twice == pytest.approx(2.0)  # of the same product
 
 

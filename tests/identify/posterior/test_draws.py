@@ -8,7 +8,7 @@ from pipeline.identify.posterior.draws import truncated_gaussian
 
 
 def drawn(centre, precision, low, high, count=4000, seed=0) -> np.ndarray:
-    given = (np.array(one, float) for one in (centre, precision, low, high))
+    given = (np.array(argument, float) for argument in (centre, precision, low, high))
     return truncated_gaussian(*given, count, np.random.default_rng(seed))
 
 
@@ -48,6 +48,6 @@ def test_two_dimensions_have_the_moments_of_quadrature(low):
 
 
 def test_a_seed_gives_the_same_samples_and_another_does_not():
-    about = ([0, 0], [[2, 1], [1, 2]], [-1, -1], [1, 1])
-    np.testing.assert_array_equal(drawn(*about, 50), drawn(*about, 50))
-    assert not np.array_equal(drawn(*about, 50), drawn(*about, 50, seed=1))
+    gaussian = ([0, 0], [[2, 1], [1, 2]], [-1, -1], [1, 1])
+    np.testing.assert_array_equal(drawn(*gaussian, 50), drawn(*gaussian, 50))
+    assert not np.array_equal(drawn(*gaussian, 50), drawn(*gaussian, 50, seed=1))

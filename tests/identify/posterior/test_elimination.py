@@ -38,7 +38,7 @@ class Case:
         )
         self.gap = rng.normal(0, 0.1, size)
         self.slopes = rng.normal(0, 1, (PHI, size))
-        self.own = rng.normal(0, 50, (INNER, size))
+        self.nuisance_slopes = rng.normal(0, 50, (INNER, size))
         self.nuisances = np.array([1e-4, -3e-4, 4e-6])
 
     def spread(self, force, cloud, way) -> np.ndarray:
@@ -48,7 +48,7 @@ class Case:
         recording = object.__new__(Likelihood)
         recording.tolerances, recording.moved = self.tolerances, 0.0
         return recording._eliminated(
-            self.residuals, self.gap, self.slopes, self.own, self.nuisances
+            self.residuals, self.gap, self.slopes, self.nuisance_slopes, self.nuisances
         )
 
     def full(self) -> tuple[np.ndarray, np.ndarray]:
@@ -67,11 +67,11 @@ class Case:
         ]
         linear.append(has.pose * self.columns["force_late"])
         linear += [
-            has.jitter * np.where(self.residuals.of_frame(frame), self.own[1], 0)
+            has.jitter * np.where(self.residuals.of_frame(frame), self.nuisance_slopes[1], 0)
             for frame in (8, 9)
         ]
         sigma = self.spread(has.force, has.cloud, has.way)
-        rows = np.concatenate([self.slopes, self.own, linear]).T / sigma[:, None]
+        rows = np.concatenate([self.slopes, self.nuisance_slopes, linear]).T / sigma[:, None]
         count = len(linear)
         inner = np.zeros((INNER, rows.shape[1]))
         inner[:, PHI : PHI + INNER] = np.diag(1 / has.simulated)
@@ -86,7 +86,7 @@ def case() -> Case:
 
 
 def test_the_quadratic_is_the_minimum_over_the_nuisances(case):
-    found, (rows, aim) = case.expanded(), case.full()
+    expansion, (rows, aim) = case.expanded(), case.full()
 
     def least(d: np.ndarray) -> float:
         left = aim - rows[:, :PHI] @ d
@@ -95,33 +95,33 @@ def test_the_quadratic_is_the_minimum_over_the_nuisances(case):
 
     base = least(np.zeros(PHI))
     for d in np.random.default_rng(1).normal(0, 0.3, (5, PHI)):
-        quadratic = -2 * found.gradient @ d + d @ found.hessian @ d
+        quadratic = -2 * expansion.gradient @ d + d @ expansion.hessian @ d
         assert quadratic == pytest.approx(least(d) - base, rel=1e-6)
 
 
 def test_the_covariance_is_the_block_of_the_full_inverse(case):
-    found, (rows, _) = case.expanded(), case.full()
+    expansion, (rows, _) = case.expanded(), case.full()
     block = np.linalg.inv(rows.T @ rows)[:PHI, :PHI]
-    np.testing.assert_allclose(np.linalg.inv(found.hessian), block, rtol=1e-6)
+    np.testing.assert_allclose(np.linalg.inv(expansion.hessian), block, rtol=1e-6)
     given = np.linalg.inv(rows[:, PHI:].T @ rows[:, PHI:])
-    np.testing.assert_allclose(found.spread, np.sqrt(np.diag(given)[:INNER]), rtol=1e-6)
+    np.testing.assert_allclose(expansion.spread, np.sqrt(np.diag(given)[:INNER]), rtol=1e-6)
 
 
 def test_the_best_nuisances_follow_the_coordinates(case):
-    found, (rows, aim) = case.expanded(), case.full()
+    expansion, (rows, aim) = case.expanded(), case.full()
     d = np.array([0.1, -0.2, 0.3, 0.05])
     best = np.linalg.lstsq(rows[:, PHI:], aim - rows[:, :PHI] @ d, rcond=None)[0][:INNER]
-    np.testing.assert_allclose(found.nuisances[0] + found.nuisances[1] @ d, best, rtol=1e-6)
+    np.testing.assert_allclose(expansion.nuisances[0] + expansion.nuisances[1] @ d, best, rtol=1e-6)
 
 
 def test_the_misfit_has_the_linear_ones_at_their_best_and_the_simulated_as_they_are(case):
-    found, (rows, aim) = case.expanded(), case.full()
+    expansion, (rows, aim) = case.expanded(), case.full()
     linear = rows[:, PHI + INNER :]
     left = aim - linear @ np.linalg.lstsq(linear, aim, rcond=None)[0]
-    assert found.misfit == pytest.approx(left @ left, rel=1e-9)
+    assert expansion.misfit == pytest.approx(left @ left, rel=1e-9)
     has, size = case.tolerances, len(case.gap)
     sigma = case.spread(has.force, has.cloud, has.way)
-    np.testing.assert_allclose(found.left, left[:size] * sigma, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(expansion.left, left[:size] * sigma, rtol=1e-6, atol=1e-12)
 
 
 NAMED = "force cloud way release camera hand jitter shift turn bias drift pose".split()
@@ -130,16 +130,16 @@ NAMED = "force cloud way release camera hand jitter shift turn bias drift pose".
 @pytest.mark.parametrize("name", NAMED)
 def test_each_tolerance_widens_what_is_known(case, name):
     wide = Case(**{name: 3 * getattr(case.tolerances, name)}).expanded()
-    known = np.linalg.eigvalsh(case.expanded().hessian - wide.hessian)
+    eigenvalues = np.linalg.eigvalsh(case.expanded().hessian - wide.hessian)
     size = np.abs(case.expanded().hessian).max()
-    assert known.max() > 1e-9 * size and known.min() > -1e-9 * size
+    assert eigenvalues.max() > 1e-9 * size and eigenvalues.min() > -1e-9 * size
 
 
 def test_tolerances_are_the_episodes_own_or_as_usual():
     usual = Tolerances()
     delays = {"camera": {"error": 3e-4}, "pose": {"error": 4e-4}}
-    about = {"preprocessing": {"release_error": 5e-4, "delays": delays}}
-    summary = Tolerances.of(SimpleNamespace(metadata=about))
+    metadata = {"preprocessing": {"release_error": 5e-4, "delays": delays}}
+    summary = Tolerances.of(SimpleNamespace(metadata=metadata))
     assert (summary.release, summary.pose) == (5e-4, 4e-4)
     assert summary.simulated == pytest.approx([5e-4, 5e-4, usual.hand])
     delays = {"camera": {"error": None, "left": 3e-3}, "pose": {"error": 4e-4, "left": 4e-3}}
@@ -159,9 +159,9 @@ def held(fall: float | None, force: float = 20.0) -> SimpleNamespace:
     """A hand that holds a force until 1 s, when it falls within `fall`."""
     time = np.arange(0, 1.3, 0.03)
     pull = np.where(time < 1, force, 0.0)
-    about = {} if fall is None else {"preprocessing": {"release_fall": fall}}
+    metadata = {} if fall is None else {"preprocessing": {"release_fall": fall}}
     course = np.stack([0 * pull, 0.6 * pull, 0.8 * pull], axis=1)
-    return SimpleNamespace(time=time, force=course, release_time=1.0, metadata=about)
+    return SimpleNamespace(time=time, force=course, release_time=1.0, metadata=metadata)
 
 
 def test_pads_that_open_linearly_let_the_force_fall_as_recorded():

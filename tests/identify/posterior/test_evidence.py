@@ -40,8 +40,8 @@ def test_what_is_written_is_read_in_its_order(launches) -> None:
         for y, z, error, landing in launches
     ]
     with tempfile.TemporaryDirectory() as folder:
-        found = read(Path(folder), "\n".join([HEAD, *rows, ""]))
-    assert found == [
+        observed = read(Path(folder), "\n".join([HEAD, *rows, ""]))
+    assert observed == [
         Observed((y, z), 0.002 if error is None else error, landing)
         for y, z, error, landing in launches
     ]

@@ -15,25 +15,25 @@ TRUE = np.array([8.0, 9.0, 3.0]) * SIZE
 START = np.array([7.0, 7.0, 4.0]) * SIZE
 
 
-def curves(count: int, noise: float = 0.1, seed: int = 0, **about) -> list[Curve]:
+def curves(count: int, noise: float = 0.1, seed: int = 0, **options) -> list[Curve]:
     rng = np.random.default_rng(seed)
-    return [Curve(curve(TRUE) + rng.normal(0, noise, 40), **about) for _ in range(count)]
+    return [Curve(curve(TRUE) + rng.normal(0, noise, 40), **options) for _ in range(count)]
 
 
-def away(found, phi: np.ndarray) -> float:
+def away(result, phi: np.ndarray) -> float:
     """In standard deviations given the other coordinates."""
-    return np.abs((found.phi - phi) * np.sqrt(np.diag(found.hessian))).max()
+    return np.abs((result.phi - phi) * np.sqrt(np.diag(result.hessian))).max()
 
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_it_finds_scipys_minimum(count):
     seen, box = curves(count), space()
-    found = fit(seen, box, START)
+    result = fit(seen, box, START)
     best = least(seen, box, START)
-    assert found.settled and away(found, best) < 0.05
-    assert len(found.expansions) == count and found.nuisances.shape == (count, 3)
+    assert result.settled and away(result, best) < 0.05
+    assert len(result.expansions) == count and result.nuisances.shape == (count, 3)
     np.testing.assert_allclose(
-        found.hessian, sum(expansion.hessian for expansion in found.expansions)
+        result.hessian, sum(expansion.hessian for expansion in result.expansions)
     )
 
 
@@ -42,49 +42,49 @@ def test_a_bound_holds_the_mode_and_the_others_give_way(monkeypatch):
     monkeypatch.setattr(module, "STILL", 0.05)
     seen = [Curve(curve(np.array([8.0, 9.0, -0.5]) * SIZE))]
     box = space()
-    found = fit(seen, box, START)
-    assert found.settled and found.phi[2] == 0.0 and found.gradient[2] < 0
-    assert away(found, least(seen, box, START)) < 0.05
+    result = fit(seen, box, START)
+    assert result.settled and result.phi[2] == 0.0 and result.gradient[2] < 0
+    assert away(result, least(seen, box, START)) < 0.05
     assert all(np.all(phi >= 0) for phi in seen[0].requested)
 
 
 def test_samples_lie_around_the_mode_and_fall_off_from_a_bound():
     """What a settled fit left of its last step moves none; what leads out of bounds does."""
-    box, found = space(), fit(curves(1), space(), START)
+    box, result = space(), fit(curves(1), space(), START)
 
     def drawn(phi: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-        at = replace(found, phi=phi, gradient=gradient)
+        at = replace(result, phi=phi, gradient=gradient)
         return samples_around(at, box, 1.0, np.random.default_rng(0))
 
-    left = np.sqrt(np.diag(found.hessian))
-    np.testing.assert_array_equal(drawn(found.phi, left), drawn(found.phi, 0 * left))
-    ends = found.phi * [1, 1, 0], np.array([0, 0, -4]) * left
+    left = np.sqrt(np.diag(result.hessian))
+    np.testing.assert_array_equal(drawn(result.phi, left), drawn(result.phi, 0 * left))
+    ends = result.phi * [1, 1, 0], np.array([0, 0, -4]) * left
     flat, steep = (drawn(ends[0], slope)[:, 2].mean() for slope in (0 * left, ends[1]))
     assert 0 < steep < flat / 2
 
 
 def test_a_prior_pulls_as_far_as_scipy_says():
     seen, box = curves(1, sigma=1.0), space(expected=np.array([8.0, 15.0, 3.0]), spread=0.5)
-    found, free = fit(seen, box, START), fit(seen, space(), START)
-    assert away(found, least(seen, box, START)) < 0.05
-    assert found.phi[1] > free.phi[1] + 2 * SIZE[1]
-    gap = found.phi - box.expected
-    assert found.misfit == pytest.approx(
-        found.expansions[0].misfit + np.sum(gap**2 * box.precision)
+    result, free = fit(seen, box, START), fit(seen, space(), START)
+    assert away(result, least(seen, box, START)) < 0.05
+    assert result.phi[1] > free.phi[1] + 2 * SIZE[1]
+    gap = result.phi - box.expected
+    assert result.misfit == pytest.approx(
+        result.expansions[0].misfit + np.sum(gap**2 * box.precision)
     )
 
 
 def test_launches_count_as_a_recording_does():
     first, second = curves(2)
-    about = SimpleNamespace(
+    launches = SimpleNamespace(
         expand=lambda points, phi, steps: (
-            (one := second.expand(points, phi, steps, None, None)).misfit,
-            one.hessian,
-            one.gradient,
+            (expansion := second.expand(points, phi, steps, None, None)).misfit,
+            expansion.hessian,
+            expansion.gradient,
         )
     )
-    found = fit([first], space(), START, launches=about)
-    assert away(found, least([first, second], space(), START)) < 0.05
+    result = fit([first], space(), START, launches=launches)
+    assert away(result, least([first, second], space(), START)) < 0.05
 
 
 def test_a_step_into_failure_is_taken_shorter():
@@ -93,8 +93,8 @@ def test_a_step_into_failure_is_taken_shorter():
     fit(free, space(), START)
     first = free[0].requested[1]
     seen = curves(1, fails=lambda phi: np.allclose(phi, first, atol=0.2 * SIZE))
-    found = fit(seen, space(), START)
-    assert away(found, least(seen, space(), START)) < 0.05
+    result = fit(seen, space(), START)
+    assert away(result, least(seen, space(), START)) < 0.05
     assert (
         np.allclose(seen[0].requested[1], first)
         and len(seen[0].requested) > len(free[0].requested) - 1
@@ -141,8 +141,8 @@ def test_no_step_is_longer_than_said(monkeypatch):
 
 def test_progress_tells_of_each_nearer_expansion():
     summary = []
-    found = fit(curves(1), space(), START, progress=summary.append)
-    assert summary[-1].misfit == found.misfit and summary[0].misfit > 10 * found.misfit
+    result = fit(curves(1), space(), START, progress=summary.append)
+    assert summary[-1].misfit == result.misfit and summary[0].misfit > 10 * result.misfit
 
 
 def test_finite_differences_stay_within_the_upper_bounds():
@@ -154,13 +154,13 @@ def test_finite_differences_stay_within_the_upper_bounds():
 def test_without_a_recording_is_a_fit_without_it():
     """To first order: recordings that differ by as much as their noise."""
     seen, box = curves(3), space()
-    found, refit = fit(seen, box, START), fit(seen[1:], box, START)
+    result, refit = fit(seen, box, START), fit(seen[1:], box, START)
     spread = np.sqrt(np.diag(np.linalg.inv(refit.hessian)))
-    summary = leave_one_out(SimpleNamespace(fit=found, coordinates=box), 0)
+    summary = leave_one_out(SimpleNamespace(fit=result, coordinates=box), 0)
     moved = np.array(list(summary["moved"].values()))
-    np.testing.assert_allclose(moved, (refit.phi - found.phi) / spread, atol=0.1)
+    np.testing.assert_allclose(moved, (refit.phi - result.phi) / spread, atol=0.1)
     there = seen[0].expand(None, refit.phi, None, None, None).misfit
-    assert summary["misfit"] == pytest.approx(there - found.expansions[0].misfit, abs=0.3)
+    assert summary["misfit"] == pytest.approx(there - result.expansions[0].misfit, abs=0.3)
 
 
 def test_disagreement_is_one_of_alike_recordings_and_grows_with_a_shift():

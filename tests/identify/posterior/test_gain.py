@@ -19,9 +19,9 @@ def model() -> LandingModel:
     return landing_model()
 
 
-def conditioned(covariance, known: list[int], rest: list[int]) -> np.ndarray:
-    """Of a joint Gaussian's `rest` given its `known`, by its precision: another way than ours."""
-    both = [*rest, *known]
+def conditioned(covariance, given: list[int], rest: list[int]) -> np.ndarray:
+    """The covariance of `rest` given `given`, by the precision: another way than ours."""
+    both = [*rest, *given]
     precision = np.linalg.inv(covariance[np.ix_(both, both)])
     return np.linalg.inv(precision[: len(rest), : len(rest)])
 
@@ -34,17 +34,17 @@ def test_a_launch_narrows_as_the_joint_gaussian_of_landings_says(model) -> None:
         joint += np.diag([1e-12, 1e-12, *[model.draw[0] ** 2 + TAPE**2] * count])
         left = conditioned(joint, list(range(2, 2 + count)), [0, 1])
         expected = 1.645 * np.sqrt(np.diag(left) + model.draw**2)
-        found = model.after(model.launched(0, TAPE, count))
-        np.testing.assert_allclose(found, expected, rtol=1e-5)
-        assert (found < model.half_width).all()
+        half_widths = model.after(model.launched(0, TAPE, count))
+        np.testing.assert_allclose(half_widths, expected, rtol=1e-5)
+        assert (half_widths < model.half_width).all()
 
 
 def test_knowing_some_exactly(model) -> None:
     left = conditioned(COVARIANCE, [1, 3], [0, 2])
     spread = np.einsum("td,de,te->t", GRADIENT[:, [0, 2]], left, GRADIENT[:, [0, 2]])
     expected = 1.645 * np.sqrt(spread + model.draw**2)
-    found = model.after(model.exact(["elasticity_damping", "air_drag", "unknown"]))
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    half_widths = model.after(model.exact(["elasticity_damping", "air_drag", "unknown"]))
+    np.testing.assert_allclose(half_widths, expected, rtol=1e-9)
 
 
 def test_an_exact_arm_leaves_what_the_samples_spread(model) -> None:

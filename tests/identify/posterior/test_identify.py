@@ -36,8 +36,8 @@ def recorded(phase: float, seed: int, noise=(0.0, 0.0)):
     """Hang, grasp at 0.6 s, lift by 1.2 s, pull to 0.4 m by 3 s, release at 3.8 s."""
     empty = pulled(160, 130, 0.6, (0.6, 1.2), (1.2, 3.0), 3.8, first_frame=phase)
     force, depth = noise
-    about = {"force_noise": force, "depth_noise": depth, "seed": seed}
-    return own_law_episode(SLING, empty, TRUTH, cutoff=CUTOFF, **about)
+    options = {"force_noise": force, "depth_noise": depth, "seed": seed}
+    return own_law_episode(SLING, empty, TRUTH, cutoff=CUTOFF, **options)
 
 
 def found_of(*episodes, workers: int = WORKERS):
@@ -61,33 +61,33 @@ def both(exact):
 
 def test_what_moves_a_whole_picture_of_the_recoil_counts_as_one_error(first) -> None:
     """A constant repeats itself in all bins, alternating signs in none."""
-    (one,) = first.fit.expansions
-    seen, count = one.residuals, len(one.left) - 2 * len(one.residuals.frame)
+    (expansion,) = first.fit.expansions
+    seen, count = expansion.residuals, len(expansion.left) - 2 * len(expansion.residuals.frame)
     frame = seen.frame[seen.recoils][0]
     bins = np.flatnonzero(seen.frame == frame)
     gone = seen.gone()[bins[0]]
     for signs, repeated in ((1.0, np.sqrt(len(bins))), ((-1.0) ** np.arange(len(bins)), 1.0)):
-        left = np.zeros_like(one.left)
+        left = np.zeros_like(expansion.left)
         left[count + bins] = 2e-3 * signs
-        found = replace(one, left=left).recoil_discrepancy
-        assert found == pytest.approx(2e-3 / gone * repeated, rel=0.25)
-        wider = first.recordings[0].with_wider_tolerances(replace(one, left=left)).tolerances
-        assert wider.way == max(first.recordings[0].tolerances.way, found)
+        discrepancy = replace(expansion, left=left).recoil_discrepancy
+        assert discrepancy == pytest.approx(2e-3 / gone * repeated, rel=0.25)
+        wider = first.recordings[0].with_wider_tolerances(replace(expansion, left=left)).tolerances
+        assert wider.way == max(first.recordings[0].tolerances.way, discrepancy)
 
 
-def told_of(found) -> dict:
-    return identify.confidence(found)
+def told_of(result) -> dict:
+    return identify.confidence(result)
 
 
 def test_the_truth_is_found_where_no_prior_pulls(exact, monkeypatch):
     """The priors of drag, softening and share expect the truth; the loss factor's does not."""
-    priors = {name: one for name, one in coordinates.PRIORS.items() if name != LOSS}
+    priors = {name: prior for name, prior in coordinates.PRIORS.items() if name != LOSS}
     priors["softening"] = TRUE[SPACE.names.index("softening")], 0.15
     monkeypatch.setattr(coordinates, "PRIORS", priors)
-    found = found_of(*exact)
-    assert found.fit.settled
-    gap = found.fit.phi - TRUE
-    assert np.sqrt(gap @ found.fit.hessian @ gap) < 4 * STILL  # of standard deviations
+    result = found_of(*exact)
+    assert result.fit.settled
+    gap = result.fit.phi - TRUE
+    assert np.sqrt(gap @ result.fit.hessian @ gap) < 4 * STILL  # of standard deviations
     assert abs(gap[0]) < 4e-3 and abs(gap[1]) < 0.15
 
 
@@ -98,13 +98,13 @@ def test_the_loss_factors_prior_pulls_towards_it_and_no_farther(first):
 
 
 def test_intervals_hold_the_truth_and_two_recordings_narrow_them(first, both):
-    one, two = (told_of(found)["parameters"] for found in (first, both))
+    single, double = (told_of(result)["parameters"] for result in (first, both))
     for name in parameter_names(SLING.law):
         value = TRUTH.sample()[name]
-        for about in (one[name], two[name]):
-            assert about["low"] <= value * (1 + 1e-9) and value * (1 - 1e-9) <= about["high"]
-    widths = [about["youngs_modulus"] for about in (one, two)]
-    widths = [about["high"] - about["low"] for about in widths]
+        for interval in (single[name], double[name]):
+            assert interval["low"] <= value * (1 + 1e-9) and value * (1 - 1e-9) <= interval["high"]
+    widths = [intervals["youngs_modulus"] for intervals in (single, double)]
+    widths = [interval["high"] - interval["low"] for interval in widths]
     assert widths[1] < 0.85 * widths[0]
 
 
@@ -131,15 +131,15 @@ def test_the_theta_file_is_of_the_band_after_all_that_stretched_it(first):
     """The deepest recording, or a launch that went deeper."""
     episode = first.recordings[0].episode
     deeper = replace(episode, position=1.1 * episode.position)
-    one = identify.recorded_history(SLING, [episode])
-    assert identify.theta_entries(first)["history"] == vars(one)
+    history = identify.recorded_history(SLING, [episode])
+    assert identify.theta_entries(first)["history"] == vars(history)
     for two in ([episode, deeper], [deeper, episode]):
-        assert identify.recorded_history(SLING, two).deepest == pytest.approx(1.1 * one.deepest)
-    setup = LaunchSetup.of(PARAMS.setup, PARAMS.sling, one)
-    for draw, deepest in (((-0.1, -0.1), one.deepest), ((-0.6, -0.3), np.hypot(0.6, 0.3))):
+        assert identify.recorded_history(SLING, two).deepest == pytest.approx(1.1 * history.deepest)
+    setup = LaunchSetup.of(PARAMS.setup, PARAMS.sling, history)
+    for draw, deepest in (((-0.1, -0.1), history.deepest), ((-0.6, -0.3), np.hypot(0.6, 0.3))):
         launches = LaunchLikelihood([Observed(draw, 0.001, 3.0)], SLING, setup)
         written = identify.theta_entries(replace(first, launches=launches))
-        assert written["history"] == vars(replace(one, deepest=float(deepest)))
+        assert written["history"] == vars(replace(history, deepest=float(deepest)))
 
 
 def test_workers_change_no_byte(exact, first):
@@ -214,7 +214,7 @@ def test_pictures_with_too_few_points_along_the_band_are_said_to_count_for_nothi
         return cloud[np.argsort(cloud[:, 0])[chosen]] if len(cloud) else cloud
 
     few = replace(exact[0], clouds=[thinned(cloud) for cloud in exact[0].clouds])
-    found = found_of(few)
-    assert told_of(found)["recordings"][0]["pictures"] == []
+    result = found_of(few)
+    assert told_of(result)["recordings"][0]["pictures"] == []
     (line,) = capsys.readouterr().err.splitlines()
     assert "fewer than 4 points in each of 16 parts of the band, so its force alone" in line

@@ -19,7 +19,7 @@ def toy(sling, setup, theta: np.ndarray, draws: np.ndarray, workers: int) -> Sim
     """log landing is linear in both coordinates; none from draws above z = 0."""
     y, z = np.asarray(draws).T
     landing = np.exp(theta @ [1.0, 0.5]) * y**2 * (1 - z)
-    failure = [None if one <= 0 else "no" for one in z]
+    failure = [None if height <= 0 else "no" for height in z]
     return SimpleNamespace(landing_y=landing, failure=failure)
 
 
@@ -52,12 +52,12 @@ def test_the_update_is_the_linear_gaussian_one() -> None:
 
 
 def test_two_launches_tell_more_than_one_and_their_order_nothing() -> None:
-    one, two = Observed((-0.5, -0.2), 0.001, 0.31), Observed((-0.6, -0.1), 0.0, 0.4)
-    first, second = expanded(one), expanded(two)
-    for both in (expanded(one, two), expanded(two, one)):
+    near, far = Observed((-0.5, -0.2), 0.001, 0.31), Observed((-0.6, -0.1), 0.0, 0.4)
+    first, second = expanded(near), expanded(far)
+    for both in (expanded(near, far), expanded(far, near)):
         for index in (1, 2, 3):
             np.testing.assert_allclose(both[index], first[index] + second[index], rtol=1e-6)
-    assert np.trace(expanded(one, two)[2]) > max(np.trace(first[2]), np.trace(second[2]))
+    assert np.trace(expanded(near, far)[2]) > max(np.trace(first[2]), np.trace(second[2]))
 
 
 def test_a_launch_that_fails_in_simulation_counts_for_nothing() -> None:
@@ -82,19 +82,21 @@ def test_each_launch_is_of_the_band_that_the_launches_before_it_left(monkeypatch
     monkeypatch.setattr(launches, "launch", softened)
     draws = [(-0.3, -0.4), (-0.4, -0.1), (-0.6, -0.1), (-0.4, -0.2)]  # 0.5, 0.41, 0.61, 0.45 m
     observed = [Observed(draw, 0.001, 0.3) for draw in draws]
-    found = LaunchLikelihood(observed, None, recorded)
-    misfit, hessian, gradient = found.expand(lambda phi: phi, np.zeros(2), STEPS)
+    likelihood = LaunchLikelihood(observed, None, recorded)
+    misfit, hessian, gradient = likelihood.expand(lambda phi: phi, np.zeros(2), STEPS)
     seen = [0.45, 0.5, 0.5, np.hypot(0.6, 0.1)]
-    assert found.deepest == pytest.approx(seen) and found.after == pytest.approx(seen[-1])
+    assert likelihood.deepest == pytest.approx(seen) and likelihood.after == pytest.approx(seen[-1])
     each = []
-    for one, before in zip(observed, seen, strict=True):
+    for observation, before in zip(observed, seen, strict=True):
         setup = replace(recorded, history=LaunchHistory(1.0, 0.5, before))
-        each.append(LaunchLikelihood([one], None, setup))
+        each.append(LaunchLikelihood([observation], None, setup))
         each[-1].expand(lambda phi: phi, np.zeros(2), STEPS)
-    np.testing.assert_allclose(found.left, np.concatenate([one.left for one in each]))
-    np.testing.assert_allclose(found.design, np.hstack([one.design for one in each]), rtol=1e-9)
-    assert misfit == pytest.approx(sum(float(one.gap @ one.gap) for one in each))
-    assert np.ptp(found.left) > 0.1
+    np.testing.assert_allclose(likelihood.left, np.concatenate([part.left for part in each]))
+    np.testing.assert_allclose(
+        likelihood.design, np.hstack([part.design for part in each]), rtol=1e-9
+    )
+    assert misfit == pytest.approx(sum(float(part.gap @ part.gap) for part in each))
+    assert np.ptp(likelihood.left) > 0.1
 
 
 def test_at_the_truth_nothing_pulls() -> None:
@@ -107,22 +109,22 @@ def test_at_the_truth_nothing_pulls() -> None:
 
 def test_a_launch_is_held_against_what_all_else_predicts() -> None:
     """As Gauss has it when the launch is really left out: here a, b have a prior and another."""
-    one, other = Observed((-0.5, -0.2), 0.001, 0.34), Observed((-0.6, -0.1), 0.0, 0.4)
+    near, far = Observed((-0.5, -0.2), 0.001, 0.34), Observed((-0.6, -0.1), 0.0, 0.4)
     prior = np.diag([40.0, 250.0])
-    both, _, hessian, gradient = expanded(one, other)
-    found = without_each(both, prior + hessian, gradient)
-    for index, (own, rest) in enumerate(((one, other), (other, one))):
-        _, _, known, pull = expanded(rest)
-        alone, *_ = expanded(own)
-        covariance = np.linalg.inv(prior + known)
+    both, _, hessian, gradient = expanded(near, far)
+    scores = without_each(both, prior + hessian, gradient)
+    for index, (observation, rest) in enumerate(((near, far), (far, near))):
+        _, _, information, pull = expanded(rest)
+        alone, *_ = expanded(observation)
+        covariance = np.linalg.inv(prior + information)
         slope = alone.design[:, 0]
         predicted = alone.gap[0] - slope @ covariance @ pull
-        assert found[index] == pytest.approx(
+        assert scores[index] == pytest.approx(
             predicted / np.sqrt(1 + slope @ covariance @ slope), rel=1e-6
         )
     wider = without_each(both, prior + hessian, gradient, widened=3.0)
-    assert np.all(np.abs(wider) < np.abs(found))
-    failed = expanded(one, Observed((-0.5, 0.2), 0.001, 0.31))
+    assert np.all(np.abs(wider) < np.abs(scores))
+    failed = expanded(near, Observed((-0.5, 0.2), 0.001, 0.31))
     assert np.isnan(without_each(failed[0], prior + failed[2], failed[3])[1])
 
 

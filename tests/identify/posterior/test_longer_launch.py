@@ -32,10 +32,10 @@ def summary(params):
         _, hessian, gradient = LaunchLikelihood(observed, sling, setup).expand(
             coordinates.parameters, phi, coordinates.steps
         )
-        return known + hessian, gradient
+        return precision + hessian, gradient
 
-    known = np.diag(coordinates.precision + 1e2)  # as if recordings told each within 0.1
-    return coordinates.names, known, by
+    precision = np.diag(coordinates.precision + 1e2)  # as if recordings told each within 0.1
+    return coordinates.names, precision, by
 
 
 def test_a_longer_launch_gives_back_more_or_loses_less(summary) -> None:
@@ -46,8 +46,8 @@ def test_a_longer_launch_gives_back_more_or_loses_less(summary) -> None:
 
 
 def test_two_launches_narrow_what_one_leaves_open(summary) -> None:
-    names, known, by = summary
-    one, two = (np.linalg.inv(by(count)[0]) for count in (1, 2))
+    names, precision, by = summary
+    single, double = (np.linalg.inv(by(count)[0]) for count in (1, 2))
     place = names.index("log_returned_share")
-    assert two[place, place] < one[place, place] < 1 / known[place, place]
-    assert (np.linalg.eigvalsh(one - two) > -1e-9).all()
+    assert double[place, place] < single[place, place] < 1 / precision[place, place]
+    assert (np.linalg.eigvalsh(single - double) > -1e-9).all()

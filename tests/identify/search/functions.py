@@ -103,6 +103,6 @@ def alone(name: str, evaluate, rollouts: int, optimizer=BUDGET, names=NAMES, **s
     """The history of a search of one phase by the optimiser of that name."""
     history = History("toy", names)
     settings |= {"seed": optimizer.seed, "population": optimizer.population}
-    one = build(name, len(history.names), rollouts=rollouts, **settings)
-    search(one, evaluate, history, rollouts=rollouts)
+    algorithm = build(name, len(history.names), rollouts=rollouts, **settings)
+    search(algorithm, evaluate, history, rollouts=rollouts)
     return history

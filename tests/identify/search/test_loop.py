@@ -85,11 +85,11 @@ class Recorder:
 def test_exactly_the_budget_is_spent(sizes: list[int], data: st.DataObject) -> None:
     """Whatever sizes are asked for; the batch that is cut is not told."""
     rollouts = data.draw(st.integers(1, sum(sizes)))
-    one, history = Recorder(*sizes), History("toy", NAMES)
-    search(one, quadratic(CENTRE, np.eye(5)), history, rollouts=rollouts)
+    recorder, history = Recorder(*sizes), History("toy", NAMES)
+    search(recorder, quadratic(CENTRE, np.eye(5)), history, rollouts=rollouts)
     assert len(history.total) == rollouts
     whole = [size for size, end in zip(sizes, np.cumsum(sizes), strict=True) if end <= rollouts]
-    assert [len(losses) for losses in one.summary] == whole
+    assert [len(losses) for losses in recorder.summary] == whole
     generation = np.repeat(np.arange(len(sizes)), sizes)[:rollouts]
     assert history.table["generation"].to_pylist() == generation.tolist()
 
@@ -97,9 +97,13 @@ def test_exactly_the_budget_is_spent(sizes: list[int], data: st.DataObject) -> N
 def test_failed_points_are_told_as_twice_the_worst_so_far() -> None:
     values = iter([np.array([1.0, np.inf, 3.0]), np.array([2.0, np.inf]), np.array([4.0, np.inf])])
     evaluate = Evaluate(lambda unit: next(values), fails=lambda unit: np.arange(len(unit)) == 1)
-    one = Recorder(3, 2, 2)
-    search(one, evaluate, History("toy", NAMES), rollouts=7)
-    assert [losses.tolist() for losses in one.summary] == [[1.0, 6.0, 3.0], [2.0, 6.0], [4.0, 8.0]]
+    recorder = Recorder(3, 2, 2)
+    search(recorder, evaluate, History("toy", NAMES), rollouts=7)
+    assert [losses.tolist() for losses in recorder.summary] == [
+        [1.0, 6.0, 3.0],
+        [2.0, 6.0],
+        [4.0, 8.0],
+    ]
 
 
 def test_fixed_axes_keep_their_physical_values() -> None:
@@ -111,8 +115,8 @@ def test_fixed_axes_keep_their_physical_values() -> None:
     evaluate = quadratic(CENTRE, np.eye(5))
     evaluate.box = box
     history = History("toy", box.names)
-    one = build("de", 3, rollouts=600, seed=1, population=20)
-    search(one, evaluate, history, rollouts=600, box=box)
+    optimizer = build("de", 3, rollouts=600, seed=1, population=20)
+    search(optimizer, evaluate, history, rollouts=600, box=box)
     np.testing.assert_allclose(history.table["poissons_ratio"], 0.45, rtol=1e-12)
     np.testing.assert_allclose(history.table["elasticity_damping"], 5e-3, rtol=1e-12)
     best = [history.best()[f"unit_{name}"] for name in box.free]
@@ -122,8 +126,8 @@ def test_fixed_axes_keep_their_physical_values() -> None:
 def test_one_free_axis_is_enough() -> None:
     evaluate = quadratic(CENTRE[:1], np.eye(1), names=NAMES[:1])
     budget = changed(population=10, generations=5, k_nn=6, k_top=2, cma_rollouts=64)
-    found = [alone(name, evaluate, 124, budget, NAMES[:1]) for name in ("de", "bo", "adam")]
-    for history in (*found, chain(evaluate, budget, NAMES[:1])[1]):
+    histories = [alone(name, evaluate, 124, budget, NAMES[:1]) for name in ("de", "bo", "adam")]
+    for history in (*histories, chain(evaluate, budget, NAMES[:1])[1]):
         assert abs(history.best()["unit_a"] - CENTRE[0]) < 0.02
 
 

@@ -79,13 +79,13 @@ def test_a_method_may_ask_for_regions_of_its_own() -> None:
     rng = np.random.default_rng(1)
     history = SimpleNamespace(unit=rng.random((80, 3)), total=rng.random(80))
     optimizer = SimpleNamespace(k_top=4, k_nn=15, delta=0.1)
-    found = []
+    results = []
     for k_top, covariance, count in ((None, True, 4), (2, False, 2)):
-        about = SimpleNamespace(k_top=k_top, covariance=covariance)
-        regions, requested = module.regions_of(about, optimizer, history)
+        method = SimpleNamespace(k_top=k_top, covariance=covariance)
+        regions, requested = module.regions_of(method, optimizer, history)
         assert len(regions) == requested == count
-        found.append(regions)
-    for ellipsoid, ball in zip(*found, strict=False):
+        results.append(regions)
+    for ellipsoid, ball in zip(*results, strict=False):
         np.testing.assert_array_equal(ball.mu, ellipsoid.mu)
         np.testing.assert_array_equal(ball.sigma, isotropic(ellipsoid.sigma))
         assert np.ptp(np.linalg.eigvalsh(ellipsoid.sigma)) > 0

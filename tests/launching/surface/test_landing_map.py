@@ -29,7 +29,7 @@ def broken_beyond(least: float):
     def launch(draws: np.ndarray):
         launched, bad = toy.launch(draws), draws.sum(1) > least
         launched.landing_y[bad] = launched.hold_force[bad] = np.nan
-        launched.failure = ["it broke" if one else None for one in bad]
+        launched.failure = ["it broke" if failed else None for failed in bad]
         return launched
 
     return launch

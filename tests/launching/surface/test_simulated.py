@@ -20,12 +20,12 @@ def source(launch=toy.launch, max_force: float = 15.0) -> SimulatedLandings:
 
 
 def test_it_says_what_the_simulator_does() -> None:
-    truth, found = toy.launch(DRAWS), source()(DRAWS)
+    truth, landings = toy.launch(DRAWS), source()(DRAWS)
     heavy = truth.hold_force > 15.0
     assert 20 < heavy.sum() < 180
-    np.testing.assert_array_equal(found.landing_y[~heavy], truth.landing_y[~heavy])
-    np.testing.assert_array_equal(found.hold_force, truth.hold_force)
-    assert np.isnan(found.landing_y[heavy]).all() and (found.failure == heavy).all()
+    np.testing.assert_array_equal(landings.landing_y[~heavy], truth.landing_y[~heavy])
+    np.testing.assert_array_equal(landings.hold_force, truth.hold_force)
+    assert np.isnan(landings.landing_y[heavy]).all() and (landings.failure == heavy).all()
 
 
 def test_failures_keep_their_reasons() -> None:

@@ -18,7 +18,7 @@ def test_the_simulator_launches_in_the_air_of_the_theta_file(tmp_path) -> None:
     theta = dict(zip(THETA, (2.5e5, 0.47, 2e-3, 0.8, 0.6), strict=True))
     contents = [{"theta": theta, "nuisances": {"air_drag": drag}} for drag in (0.0, 6.0)]
     still, moving = (simulator(params, band, content, root=tmp_path) for content in contents)
-    calm, windy = (one(draw).landing_y[0] for one in (still, moving))
+    calm, windy = (launcher(draw).landing_y[0] for launcher in (still, moving))
     assert windy < 0.99 * calm
     samples = parameters_of(contents[0]).changed(air_drag=np.array([0.0, 6.0]))
     both = moving(np.repeat(draw, 2, axis=0), samples).landing_y

@@ -26,9 +26,9 @@ def stored(root, method: str = "none") -> Stored:
     return Stored("toy", method, root)
 
 
-def write(one: Stored, draw: tuple[float, float]) -> None:
-    write_policy(one.folder / "policy.onnx", (0, 0), draw)
-    write_json(one.folder / "card.json", CARD)
+def write(policy: Stored, draw: tuple[float, float]) -> None:
+    write_policy(policy.folder / "policy.onnx", (0, 0), draw)
+    write_json(policy.folder / "card.json", CARD)
 
 
 def refusal(read, *given) -> str:
@@ -39,42 +39,42 @@ def refusal(read, *given) -> str:
 
 
 def test_a_policy_says_its_draws_and_its_card(tmp_path) -> None:
-    one = stored(tmp_path)
-    write(one, (-0.3, -0.1))
-    np.testing.assert_allclose(one.draws(TARGETS), [[-0.3, -0.1]] * 2)
-    assert one.card() == CARD | {"projectile": None, "made_with": None}
+    policy = stored(tmp_path)
+    write(policy, (-0.3, -0.1))
+    np.testing.assert_allclose(policy.draws(TARGETS), [[-0.3, -0.1]] * 2)
+    assert policy.card() == CARD | {"projectile": None, "made_with": None}
 
 
 def test_a_damaged_policy_is_one_line(tmp_path) -> None:
-    one = stored(tmp_path)
-    write(one, (-0.3, -0.1))
-    file, card = one.folder / "policy.onnx", one.folder / "card.json"
+    policy = stored(tmp_path)
+    write(policy, (-0.3, -0.1))
+    file, card = policy.folder / "policy.onnx", policy.folder / "card.json"
     whole = file.read_bytes()
     for damaged in (whole[: len(whole) // 2], b"not a network" * 20, b""):
         file.write_bytes(damaged)
-        assert refusal(one.draws, TARGETS) == f"{file}: damaged"
+        assert refusal(policy.draws, TARGETS) == f"{file}: damaged"
     for damaged in (b"{", b"\xff"):
         card.write_bytes(damaged)
-        assert refusal(one.card).startswith(f"{card}: cannot be read as JSON (")
+        assert refusal(policy.card).startswith(f"{card}: cannot be read as JSON (")
     write_json(card, CARD | {"training": {}})
-    assert refusal(one.card) == f"{card}: training.converged: is missing"
+    assert refusal(policy.card) == f"{card}: training.converged: is missing"
 
 
 def test_a_missing_policy_is_one_line(tmp_path) -> None:
-    one, folder = stored(tmp_path), tmp_path / "data/policies/toy/none"
-    assert refusal(one.draws, TARGETS) == f"{folder / 'policy.onnx'}: missing"
-    assert refusal(one.card) == f"{folder / 'card.json'}: missing"
+    policy, folder = stored(tmp_path), tmp_path / "data/policies/toy/none"
+    assert refusal(policy.draws, TARGETS) == f"{folder / 'policy.onnx'}: missing"
+    assert refusal(policy.card) == f"{folder / 'card.json'}: missing"
 
 
 def test_a_card_without_the_start_of_the_projectile_is_one_line(tmp_path) -> None:
     """Of a policy that sees it."""
-    one = stored(tmp_path)
-    write(one, (-0.3, -0.1))
+    policy = stored(tmp_path)
+    write(policy, (-0.3, -0.1))
     seeing = ProjectilePolicy(nn.Sequential(nn.Linear(3, 2)), (1.4, 2.4), BOX, (0.0, -0.22))
-    write_onnx(seeing, one.folder / "policy.onnx")
-    file = one.folder / "card.json"
-    assert refusal(one.draws, TARGETS) == f"{file}: lacks the policy's input `projectile`"
+    write_onnx(seeing, policy.folder / "policy.onnx")
+    file = policy.folder / "card.json"
+    assert refusal(policy.draws, TARGETS) == f"{file}: lacks the policy's input `projectile`"
     write_json(file, CARD | {"projectile": {"trained_at": [0.0, -0.22]}})
-    np.testing.assert_allclose(one.draws(TARGETS), seeing.draws(TARGETS), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(policy.draws(TARGETS), seeing.draws(TARGETS), rtol=0, atol=1e-6)
     file.unlink()
-    assert refusal(one.draws, TARGETS) == f"{file}: missing"
+    assert refusal(policy.draws, TARGETS) == f"{file}: missing"

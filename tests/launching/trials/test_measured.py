@@ -23,7 +23,7 @@ def read(tmp_path: Path, text: str | bytes, method: str = "ours") -> list[Measur
     launches = read_measured(file, KNOWN)
     save_scores(tmp_path / "scores.json", launches)
     assert load_scores(tmp_path / "scores.json") == launches
-    return [one for one in launches if one.method in ("", method)]
+    return [launch for launch in launches if launch.method in ("", method)]
 
 
 def test_launches_of_a_method_and_plain_ones(tmp_path) -> None:
@@ -38,17 +38,17 @@ def test_launches_of_a_method_and_plain_ones(tmp_path) -> None:
         Measured((-0.31, -0.17), 1.9, 1.925, "ours"),
         Measured((-0.35, -0.17), None, 1.925, "ours"),
     ]
-    assert [one.landing for one in read(tmp_path, text, "theirs")] == [2.2, 1.8]
+    assert [launch.landing for launch in read(tmp_path, text, "theirs")] == [2.2, 1.8]
 
 
 def test_a_target_without_a_method_is_nobodys(tmp_path) -> None:
     """It would else count as an error of every method alike."""
     text = f"{HEAD},target_m,method\n-0.3,-0.1,1.9,1.725,\n-0.3,-0.1,1.9,1.725,ours\n"
-    assert [one.target for one in read(tmp_path, text)] == [None, 1.725]
-    assert [one.target for one in read(tmp_path, text, "theirs")] == [None]
+    assert [launch.target for launch in read(tmp_path, text)] == [None, 1.725]
+    assert [launch.target for launch in read(tmp_path, text, "theirs")] == [None]
     for target in (1.725, 3.0):
         without = f"{HEAD},target_m\n-0.3,-0.1,1.9,{target}\n"
-        assert [one.target for one in read(tmp_path, without)] == [None]
+        assert [launch.target for launch in read(tmp_path, without)] == [None]
 
 
 def test_a_method_may_launch_without_a_target(tmp_path) -> None:

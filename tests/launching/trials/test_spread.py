@@ -30,12 +30,12 @@ def samples(count: int = 200) -> np.ndarray:
 
 def test_nine_landings_of_ten_lie_inside() -> None:
     """Of launches whose stiffness and draw vary as they are said to."""
-    for error, known in ((1e-3, 0), (0.0, 1), (1e-3, 1)):
-        intervals = landing_intervals(launcher, DRAWS, samples() if known else None, error)
+    for error, variation in ((1e-3, 0), (0.0, 1), (1e-3, 1)):
+        intervals = landing_intervals(launcher, DRAWS, samples() if variation else None, error)
         rng = np.random.default_rng(2)
         for draw, (low, high) in zip(DRAWS, intervals, strict=True):
             landing = toy.launch(draw + rng.normal(0, error, (4000, 2))).landing_y
-            landing = landing * (1 + known * STIFFNESS * rng.normal(size=4000))
+            landing = landing * (1 + variation * STIFFNESS * rng.normal(size=4000))
             assert 0.85 < ((landing > low) & (landing < high)).mean() < 0.94
 
 
@@ -68,7 +68,7 @@ def test_failures_of_the_few_are_left_out_and_of_the_many_are_none() -> None:
             launched = launcher(draws, thetas)
             if thetas is not None:
                 broken = np.arange(len(draws)) % 20 < 20 * share
-                launched.failure = ["it broke" if one else None for one in broken]
+                launched.failure = ["it broke" if failed else None for failed in broken]
             return launched
 
         return launch

@@ -94,10 +94,10 @@ def test_the_limit_is_the_simulators_own() -> None:
     theta = Parameters.of(world[0].law, theta)
     free = launch(*world, theta, draws)
     limit = float(free.hold_force.mean())
-    expected, found = launch(*world, theta, draws, max_force=limit), limited(free, limit)
-    assert found.failure == expected.failure and found.failure[0] is None
+    expected, result = launch(*world, theta, draws, max_force=limit), limited(free, limit)
+    assert result.failure == expected.failure and result.failure[0] is None
     for name in ("landing_y", "speed", "angle", "separation_y", "separation_z", "hold_force"):
-        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+        np.testing.assert_array_equal(getattr(result, name), getattr(expected, name))
 
 
 LANDINGS = (1.9, 3.0, float("nan"))  # within the area, beyond it, nowhere
@@ -115,9 +115,9 @@ def landed(draw: np.ndarray, number: int) -> SimpleNamespace:
 
 def test_landings_outside_the_area_stand_beside_their_failure() -> None:
     draws = np.tile([-0.3, -0.1], (3, 1))
-    one = launched(Batch("predicted", draws, [1.9, 1.9, 2.1]), landed)
-    assert (one.kind, one.targets) == ("virtual", [1.9, 1.9, 2.1])
-    assert one.draws.tolist() == draws.tolist()
-    assert one.landing == [1.9, 3.0, None]
-    assert one.failure == [None, "failed", "failed"]
-    assert one.hold_force == [300, 301, 302]
+    trial = launched(Batch("predicted", draws, [1.9, 1.9, 2.1]), landed)
+    assert (trial.kind, trial.targets) == ("virtual", [1.9, 1.9, 2.1])
+    assert trial.draws.tolist() == draws.tolist()
+    assert trial.landing == [1.9, 3.0, None]
+    assert trial.failure == [None, "failed", "failed"]
+    assert trial.hold_force == [300, 301, 302]

@@ -21,8 +21,8 @@ def test_the_same_work_on_one_and_on_two(monkeypatch) -> None:
     rows = [*parts["generations"], *parts["launches"], parts["search"]]
     assert [row.get("rollouts") or row.get("launches") for row in rows] == [5, 4, None]
     for row in rows:
-        assert [one["count"] for one in row["devices"]] == [1, 2]
-        assert all(one["equal"] and one["seconds"] > 0 for one in row["devices"])
+        assert [device["count"] for device in row["devices"]] == [1, 2]
+        assert all(device["equal"] and device["seconds"] > 0 for device in row["devices"])
         assert row["devices"][0]["speedup"] == 1
     assert parts["search"]["one_device"]["rollouts"] == 16
     assert "NOT EQUAL" not in bench.table(result)

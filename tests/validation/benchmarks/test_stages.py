@@ -30,11 +30,11 @@ def test_imports_are_told_from_work(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(bench, "HEAVY", ["heavy", "torch"])
     monkeypatch.setenv("DVC_SITE_CACHE_DIR", toy.environment["DVC_SITE_CACHE_DIR"])
     project = bench.Project(toy.folder)
-    found = bench.profile(project, ["one"])
-    assert [*found] == ["one"] and found["one"]["heavy"] == ["heavy"]
-    one = found["one"]
-    assert one["imports_s"] >= 0.4 and one["work_s"] >= 1.5 and one["dvc_s"] > 0.1
-    assert 0 < one["interpreter_s"]
+    profile = bench.profile(project, ["one"])
+    assert [*profile] == ["one"] and profile["one"]["heavy"] == ["heavy"]
+    times = profile["one"]
+    assert times["imports_s"] >= 0.4 and times["work_s"] >= 1.5 and times["dvc_s"] > 0.1
+    assert 0 < times["interpreter_s"]
     with pytest.raises(UserError, match="--steps three: there are one, two"):
         bench.profile(project, ["three"])
 

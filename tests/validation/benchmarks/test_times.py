@@ -30,8 +30,8 @@ floor@band1 | begins
 """
 
 
-def step(name: str, code: str, **about) -> MeasuredStep:
-    return MeasuredStep(name, f"`{name}`", (sys.executable, "-c", code), **about)
+def step(name: str, code: str, **options) -> MeasuredStep:
+    return MeasuredStep(name, f"`{name}`", (sys.executable, "-c", code), **options)
 
 
 @pytest.fixture
@@ -56,14 +56,14 @@ def project(tmp_path: Path) -> Path:
 def test_a_command_has_a_status_times_and_the_memory_of_its_children(tmp_path: Path) -> None:
     log = tmp_path / "log"
     words = [sys.executable, "-c", AMONG_CHILDREN]
-    found = measured(words, tmp_path, bench.surroundings(tmp_path), log, every=0.05)
-    assert found["status"] == 0 and found["seconds"] >= 0.6
-    assert 1e8 < found["peak_memory_bytes"] < 2e8
+    result = measured(words, tmp_path, bench.surroundings(tmp_path), log, every=0.05)
+    assert result["status"] == 0 and result["seconds"] >= 0.6
+    assert 1e8 < result["peak_memory_bytes"] < 2e8
     work = "import time\nwhile time.process_time() < 0.5: pass\nprint('said')\nraise SystemExit(3)"
     words = [sys.executable, "-c", work]
-    found = measured(words, tmp_path, bench.surroundings(tmp_path), log, every=0.05)
-    assert found["status"] == 3 and log.read_text() == "said\n"
-    assert found["cpu_seconds"] >= 0.5 and 0 <= found["others_share"] <= 1
+    result = measured(words, tmp_path, bench.surroundings(tmp_path), log, every=0.05)
+    assert result["status"] == 3 and log.read_text() == "said\n"
+    assert result["cpu_seconds"] >= 0.5 and 0 <= result["others_share"] <= 1
 
 
 def test_the_disk_counts_a_file_with_two_names_once(tmp_path: Path) -> None:
@@ -100,11 +100,11 @@ def test_seconds_of_a_fit_are_those_of_its_log(tmp_path: Path) -> None:
 
 
 def test_each_row_measures_a_command_that_there_is(tmp_path: Path) -> None:
-    steps = {one.name: one for one in bench.steps(tmp_path / "mine.mcap", 0.04)}
-    for one in steps.values():
-        if one.command[0].endswith("sling"):
-            parser().parse_args(one.command[1:])  # exits where it cannot be understood
-        assert not one.needs or list(steps).index(one.needs) < list(steps).index(one.name)
+    steps = {row.name: row for row in bench.steps(tmp_path / "mine.mcap", 0.04)}
+    for row in steps.values():
+        if row.command[0].endswith("sling"):
+            parser().parse_args(row.command[1:])  # exits where it cannot be understood
+        assert not row.needs or list(steps).index(row.needs) < list(steps).index(row.name)
 
 
 def test_steps_are_measured_once_and_failures_again(project: Path, tmp_path: Path) -> None:

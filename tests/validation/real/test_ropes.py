@@ -82,11 +82,11 @@ def test_a_fit_finds_what_a_rope_was_made_with_and_predicts_another_run(params) 
     true = {"bending_length": 0.15, "damping": 0.04, "drag": 0.8}
     made = swing(run, chords, true, params.sling)
     begin = {"bending_length": 0.18, "damping": 0.03, "drag": 0.5}
-    found = fitted(made, chords, params.sling, start=begin)
+    fit = fitted(made, chords, params.sling, start=begin)
     for name in ("bending_length", "damping"):  # a fifth of a second tells little of the drag
-        assert found[name] == pytest.approx(true[name], rel=0.02)
+        assert fit[name] == pytest.approx(true[name], rel=0.02)
     first, last, limp = (
-        swing(other, chords, one, params.sling) for one in (true, found, true | begin)
+        swing(other, chords, candidate, params.sling) for candidate in (true, fit, true | begin)
     )
     assert np.abs(last - first).max() < 0.1 * np.abs(limp - first).max()
 
@@ -99,7 +99,8 @@ def test_a_real_rope_is_followed_as_the_report_says_and_without_stiffness_is_not
     run, chords, values = runs[1][:50], chords_of(runs[:1]), report["values"]
     assert report["length_m"] == pytest.approx(chords.sum(), abs=1e-3)
     off, worse = (
-        1e3 * np.sqrt(((inner(swing(run, chords, one, params.sling) - run)) ** 2).sum(2).mean())
-        for one in (values, values | {"bending_length": 0.03})
+        1e3
+        * np.sqrt(((inner(swing(run, chords, candidate, params.sling) - run)) ** 2).sum(2).mean())
+        for candidate in (values, values | {"bending_length": 0.03})
     )
     assert off < 1.2 * report["predicted_run"]["by_second_mm"][0] and worse > 2 * off

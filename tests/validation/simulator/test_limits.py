@@ -80,10 +80,10 @@ def test_the_hands_work_is_accounted_for_and_losses_only_grow(bench):
 
 
 def test_random_thetas_are_finite_or_fail_by_name(bench):
-    found = robustness.section(bench, count=64, launches=32, faces=20, progress=str)
-    surveys = found.details["surveys"]
+    section = robustness.section(bench, count=64, launches=32, faces=20, progress=str)
+    surveys = section.details["surveys"]
     assert (surveys["held_fast"]["rollouts"], surveys["corners"]["rollouts"]) == (64, 32)
-    assert_kept(found.checks)
+    assert_kept(section.checks)
 
 
 def test_samples_are_as_many_as_asked_for_and_lie_where_they_should(bench):

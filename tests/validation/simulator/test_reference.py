@@ -63,5 +63,5 @@ def test_jacobian_is_the_residuals_slope(bench):
     rate = rng.normal(size=sections.shape)
     step = 1e-7
     expected = (residual(sections + step * rate) - residual(sections - step * rate)) / (2 * step)
-    found = np.einsum("ijkl,kl->ij", slope, rate)
-    assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
+    product = np.einsum("ijkl,kl->ij", slope, rate)
+    assert np.abs(product - expected).max() < 1e-6 * np.abs(expected).max()

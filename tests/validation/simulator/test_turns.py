@@ -28,19 +28,19 @@ def test_a_rigid_turn_is_braked_by_its_share_of_the_old_form(bench, seed, stretc
     """In full by s d times the rate of a stress that turns along, w x P; else by the share."""
     spin = 30 * np.random.default_rng(seed).normal(size=3)
     _, _, d, s = taut(bench, 1.0, seed, stretch)[0].parameters
-    found = {}
+    stresses = {}
     for share in (0.0, 0.5, 1.0):
         rod, sections = taut(bench, share, seed, stretch)
         rate = np.cross(spin, sections.reshape(-1, 3)).reshape(-1, 9)
-        found[share] = rod.viscous_stress(rate, sections)
+        stresses[share] = rod.viscous_stress(rate, sections)
     full = s * d * np.cross(spin, rod.stress(sections))
     size = np.abs(full).max()
-    np.testing.assert_allclose(found[1.0], full, atol=1e-8 * size)
+    np.testing.assert_allclose(stresses[1.0], full, atol=1e-8 * size)
     pull = String.of(rod.sling, THETA).force(stretch) * stretch / rod.sling.area
     left = TURNS / (TURNS + pull / rod.parameters[0])  # by what keeps the matrix regular
     for share in (0.0, 0.5):
         expected = (share + (1 - share) * left) * full
-        np.testing.assert_allclose(found[share], expected, atol=1e-8 * size)
+        np.testing.assert_allclose(stresses[share], expected, atol=1e-8 * size)
     assert left < 0.02
 
 

@@ -77,7 +77,7 @@ def test_our_own_motion_compared_with_itself_differs_in_nothing(sling):
     for finding in study.compared("itself", motion, motion, limits=True):
         assert finding.met and finding.value == 0
     stiffer = study.BandMotion(1.03 * motion.force, motion.lines + 0.006)
-    assert [one.met for one in study.compared("", motion, stiffer, limits=True)] == [
+    assert [finding.met for finding in study.compared("", motion, stiffer, limits=True)] == [
         False,
         False,
         True,

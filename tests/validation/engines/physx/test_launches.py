@@ -172,7 +172,7 @@ def test_beside_a_band_with_mass_it_is_as_fast_as_within(
     sling, launch_setup, tube, monkeypatch, rate, error
 ):
     """A chain that carries the projectile, and the same chain led by it, step after step."""
-    one, led = (Chain(np.linalg.norm(DRAWS[0])) for _ in range(2))
+    chain, led = (Chain(np.linalg.norm(DRAWS[0])) for _ in range(2))
     seen = [np.diff(led.x)[-1]]
 
     def force_on(tube, sections, nodes, young, poisson, step):
@@ -191,9 +191,9 @@ def test_beside_a_band_with_mass_it_is_as_fast_as_within(
     monkeypatch.setattr(flight, "GRAVITY", 0.0)
     flying = flown(sling, launch_setup, tube, THETAS[:1], DRAWS[:1], rate).launches
     mass = flight.Flight(sling, launch_setup, tube, THETAS[:1], DRAWS[:1], rate).mass
-    while one.tension()[-1] > 0:
-        one.advance(1e-5, mass)
-    assert flying.failure == [None] and flying.speed[0] == pytest.approx(-one.v[-1], rel=error)
+    while chain.tension()[-1] > 0:
+        chain.advance(1e-5, mass)
+    assert flying.failure == [None] and flying.speed[0] == pytest.approx(-chain.v[-1], rel=error)
 
 
 def test_a_launch_that_does_not_land_says_why(sling, launch_setup, tube, springs):
@@ -213,8 +213,8 @@ def test_a_band_that_bursts_leaves_the_others_as_they_are(sling, launch_setup, t
         return nodes
 
     alone, done = (
-        flown(sling, launch_setup, tube, THETAS, DRAWS, spoil=one)
-        for one in (lambda n, _: n, spoil)
+        flown(sling, launch_setup, tube, THETAS, DRAWS, spoil=change)
+        for change in (lambda n, _: n, spoil)
     )
     assert done.launches.failure == [None, BURST, None]
     assert np.isnan(done.launches.landing_y[1]) and np.isnan(done.gained[1])

@@ -59,9 +59,9 @@ def test_the_force_on_a_section_is_the_slope_of_the_bands_energy(sling):
     slope = np.empty((2, 3))
     for axis in range(3):
         moved = [positions.copy(), positions.copy()]
-        for sign, one in zip((-1, 1), moved, strict=True):
-            one[:, tube.middle, :, axis] += sign * 1e-7
-        slope[:, axis] = np.subtract(*(law.energy(tube, one, *moduli) for one in moved)) / 2e-7
+        for sign, nodes in zip((-1, 1), moved, strict=True):
+            nodes[:, tube.middle, :, axis] += sign * 1e-7
+        slope[:, axis] = np.subtract(*(law.energy(tube, nodes, *moduli) for nodes in moved)) / 2e-7
     assert law.force_on(tube, [tube.middle], positions, *moduli) == pytest.approx(slope, rel=1e-5)
 
 
@@ -75,7 +75,7 @@ def test_damping_brakes_a_stretch_and_no_turn(sling):
     turned = law.viscous(stretched, turn(7) @ stretched, 3.0, YOUNG, POISSON)
     assert turned == pytest.approx(np.zeros((3, 3)), abs=1e-6 * YOUNG)
     tube, delay = Tube.of(sling, edges=6, grading=1.0), np.array([0.0, 2.0, 4.0])
-    before, now = (np.tile(tube.rest * one, (3, 1, 1, 1)) for one in (1.3, 1.2))
+    before, now = (np.tile(tube.rest * stretch, (3, 1, 1, 1)) for stretch in (1.3, 1.2))
     elastic, *braked = law.force_on(tube, [0], now, YOUNG, POISSON, step=(before, delay))[:, 0]
     assert braked[0] < elastic and braked[1] - elastic == pytest.approx(2 * (braked[0] - elastic))
 

@@ -20,15 +20,15 @@ THETAS = np.array([[2.2e5, 0.45, 3e-3, 1.0, 1.0], [1.8e5, 0.40, 2e-3, 1.0, 1.0]]
 def searched(tmp_path, monkeypatch):
     """search.main without the searches, whose best are THETAS; returns the file's path."""
 
-    def found(self, engine):
+    def fake_search(self, engine):
         best = dict(zip(self.box.names, THETAS[(OURS, PHYSX).index(engine)], strict=True))
         return SimpleNamespace(best=lambda: best, total=np.array([1.0, np.inf])), 2.0
 
-    monkeypatch.setattr(search.Comparison, "search", found)
+    monkeypatch.setattr(search.Comparison, "search", fake_search)
     monkeypatch.setattr(search.Comparison, "losses", lambda self, thetas: {})
     monkeypatch.setattr(search, "release", lambda: "0")
-    about = {"versions": {}}
-    monkeypatch.setattr(search, "environment", lambda _, command: about | {"command": command})
+    context = {"versions": {}}
+    monkeypatch.setattr(search, "environment", lambda _, command: context | {"command": command})
     monkeypatch.setattr(sys, "argv", ["search", "band1", "--params", str(DEFAULTS)])
     monkeypatch.chdir(tmp_path)
     return tmp_path / "reports/validation/physx-band1.json"

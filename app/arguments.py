@@ -43,7 +43,7 @@ def quantity(unit: str, low: float, high: float, units: dict[str, float], usual:
 
 
 def likely(readings: dict[str, float], usual: float) -> str:
-    """A hint at the one of some units in which a number, given in `found`, is most usual."""
+    """A hint at the most usual of `readings`: what a number would be, by the unit it is in."""
     if not readings:
         return ""
     name = min(readings, key=lambda name: abs(math.log(readings[name] / usual)))

@@ -61,5 +61,5 @@ def figures(arguments: argparse.Namespace) -> Done:
     from app.flow.graph import outdated
     from validation.figures import as_json, listed, shown
 
-    outdated_figures = listed(Path.cwd(), outdated)
-    return as_json(outdated_figures) if arguments.json else shown(outdated_figures)
+    committed = listed(Path.cwd(), outdated)
+    return as_json(committed) if arguments.json else shown(committed)

@@ -75,20 +75,20 @@ def joined(
     path = layout.evidence / f"{band}.csv"
     scores = table.scores(layout, band)
     there = table.rows(path, "evidence") if path.is_file() else []
-    scored = [(*row.draw, row.landing) for row in there if row.landing is not None]
+    stored = [(*row.draw, row.landing) for row in there if row.landing is not None]
     rows: list[dict] = [row.cells for row in there]
     before = len(there)
     for y, z, error, landing in launches:
         launch = (y, z, landing)
         if table.among(launch, scores):
             raise UserError(table.told_twice(launch, path, layout.measured / path.name))
-        if equal != "added" and table.among(launch, scored):
+        if equal != "added" and table.among(launch, stored):
             if equal == "refused":
                 raise UserError(
                     f"{path}: this launch is there already; if you measured one more that is equal,"
                     " add --again; else `dvc repro` runs what is stale"
                 )
-            scored.remove(next(score for score in scored if table.among(launch, [score])))
+            stored.remove(next(other for other in stored if table.among(launch, [other])))
             continue
         values = (y, z, "" if error is None else error, landing)
         rows.append(dict(zip(COLUMNS, values, strict=True)))

@@ -51,7 +51,7 @@ def observe(
         root: Of the project.
 
     Returns:
-        `file`, `launches` in it, `measured_m` of this one, what `interval_at` says `before` and
+        `file`, `launches` in it, `measured_m` of this one, what `prediction_of` says `before` and
         `after`, and `warnings`, which are printed on stderr before stages run.
 
     Raises:
@@ -64,13 +64,13 @@ def observe(
     number = evidence.add(layout, band, [(*draw, error, landing)], equal)
     answer = {"file": str(layout.evidence / f"{band}.csv"), "launches": number}
     answer["measured_m"] = landing
-    answer["before"] = interval_at(params, band, method, draw, layout.root, error)
+    answer["before"] = prediction_of(params, band, method, draw, layout.root, error)
     doubts = list(doubted(answer["before"], landing, answer["file"]))
     earlier = evidence.read(layout.evidence / f"{band}.csv")[:-1]
     doubts += softened(params, band, method, draw, layout, [launch[:2] for launch in earlier])
     safety.tell(doubts)
     ran = _run(stage, layout)
-    answer["after"] = interval_at(params, band, method, draw, layout.root, error) if ran else None
+    answer["after"] = prediction_of(params, band, method, draw, layout.root, error) if ran else None
     if failure := (answer["after"] or {}).get("failure"):
         what = f"the launch fails in simulation, so it counts for nothing: {failure}"
         doubts.append(Hazard("failure", what))
@@ -94,9 +94,11 @@ def undo(
     (y, z, error, landing), number = evidence.without_last(layout, band)
     answer = {"file": str(layout.evidence / f"{band}.csv"), "launches": number}
     answer |= {"measured_m": landing, "removed": {"draw": [y, z], "error": error}}
-    answer["before"] = interval_at(params, band, method, (y, z), layout.root, error)
+    answer["before"] = prediction_of(params, band, method, (y, z), layout.root, error)
     ran = _run(stage, layout)
-    answer["after"] = interval_at(params, band, method, (y, z), layout.root, error) if ran else None
+    answer["after"] = (
+        prediction_of(params, band, method, (y, z), layout.root, error) if ran else None
+    )
     return answer | {"warnings": []}
 
 
@@ -122,7 +124,7 @@ def _run(stage: str | None, layout: Layout) -> bool:
 
 
 def doubted(before: dict | None, landing: float, file: str) -> Iterator[Hazard]:
-    """A measured landing [m] outside the interval that `interval_at` gave before."""
+    """A measured landing [m] outside the interval that `prediction_of` gave before."""
     if before is None or before["interval_90_m"] is None:
         return
     low, high = before["interval_90_m"]
@@ -161,7 +163,7 @@ def softened(
     )
 
 
-def interval_at(
+def prediction_of(
     params: Params,
     band: str,
     method: str,

@@ -3,11 +3,11 @@
     import sling2sim2real as s2s
 
     band = s2s.Band(mass=0.0408, diameter=0.010, rest_length=0.52)
-    episodes = s2s.read_mcap("my.mcap", band)       # or s2s.episode_from_arrays(...)
-    found = s2s.identify(episodes, band)            # θ, intervals, samples
-    aimed = s2s.aim(found, target=1.9)              # draw, prediction, 90 % interval
+    episodes = s2s.read_mcap("my.mcap", band)            # or s2s.episode_from_arrays(...)
+    identification = s2s.identify(episodes, band)        # θ, intervals, samples
+    aimed = s2s.aim(identification, target=1.9)          # draw, prediction, 90 % interval
     seen = s2s.Observed(aimed.draw, error=1e-3, landing=1.84)   # you launched: it landed there
-    found = s2s.identify(episodes, band, start=found, launches=[seen])
+    identification = s2s.identify(episodes, band, start=identification, launches=[seen])
 
 SI units throughout. Frame O: origin midway between the fork's tips, x along the fork, y towards the
 target, z up. Nothing is read from or written to disk but by functions that take a path. Bad input

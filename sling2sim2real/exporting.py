@@ -38,7 +38,7 @@ def export(model: Model, to: str, out: str | Path, *, episode: Episode | None = 
     >>> model = Model(band, Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6), settings=Settings.coarse())
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     done = export(model, "yaml", folder)
-    ...     sorted(one.name for one in done.folder.iterdir())
+    ...     sorted(file.name for file in done.folder.iterdir())
     ['README.md', 'band.yaml', 'card.json']
 
     Args:

@@ -189,8 +189,8 @@ def identify(
     >>> true = Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6, mooney_share=0.1, relaxation=0.004)
     >>> world = Model(band, true, settings=settings)
     >>> episode = episode_from_arrays(**rehearse(world))
-    >>> found = identify([episode], band, settings=settings, start=world)
-    >>> young = found.intervals["youngs_modulus"]
+    >>> identification = identify([episode], band, settings=settings, start=world)
+    >>> young = identification.intervals["youngs_modulus"]
     >>> young.low < 2.0e5 < young.high
     True
 

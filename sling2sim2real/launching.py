@@ -197,11 +197,11 @@ def _warnings(
         yield "no interval: too many launches beside the predicted one fail"
     sizes = model.settings.setup.fork_width, model.band.rest_length
     requested = float(stretch_of(np.array([[0.0, *draw]]), *sizes)[0])
-    stretch = getattr(model, "stretch", None)
-    if stretch is not None and requested > stretch + ROUNDING:
+    recorded = getattr(model, "stretch", None)
+    if recorded is not None and requested > recorded + ROUNDING:
         yield (
             f"the draw stretches the band by {100 * (requested - 1):.1f} %, its recordings by"
-            f" {100 * (stretch - 1):.1f} % at most: force and landing are extrapolated"
+            f" {100 * (recorded - 1):.1f} % at most: force and landing are extrapolated"
         )
     policy = getattr(model, "policy", None)
     if policy is not None and policy.card()["theta"] != model.theta.content("")["theta"]:

@@ -107,8 +107,8 @@ class Theta:
     returned_share: float = 1.0
 
     def __post_init__(self) -> None:
-        for named in fields(self):
-            object.__setattr__(self, named.name, _plain(getattr(self, named.name)))
+        for attribute in fields(self):
+            object.__setattr__(self, attribute.name, _plain(getattr(self, attribute.name)))
         if self.law == RUBBER:  # what is not given of it is none
             for name in ADDED:
                 if getattr(self, name) is None:

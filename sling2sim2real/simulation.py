@@ -140,5 +140,5 @@ def pull(
     if min(pull_time, pause, frame_rate) <= 0:
         raise UserError("pull: pull_time, pause and frame_rate must be above 0")
     hanging = hanging_guess(model.sling)[model.sling.middle, 2]
-    place = model.settings.episode, model.band.name, hanging, draw
-    return planned_pull(*place, pull_time=pull_time, pause=pause, frame_rate=frame_rate)
+    inputs = model.settings.episode, model.band.name, hanging, draw
+    return planned_pull(*inputs, pull_time=pull_time, pause=pause, frame_rate=frame_rate)

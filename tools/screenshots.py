@@ -122,8 +122,8 @@ def shoot(copy: ProjectCopy, server: Server, page: Browser, folder: Path) -> Non
     """Take all pictures."""
 
     def artifact(name: str, key: str, *texts: str, height: int | None = None) -> None:
-        artifact_id = until(lambda: server.artifact(key), f"artifact {key}")
-        page.open(f"{server.url}/artifacts/artifact/{artifact_id['latest_id']}", *texts)
+        newest = until(lambda: server.artifact(key), f"artifact {key}")
+        page.open(f"{server.url}/artifacts/artifact/{newest['latest_id']}", *texts)
         page.shoot(folder / f"{name}.png", height)
 
     def run(name: str, *texts: str) -> None:

@@ -71,7 +71,7 @@ def changes(values: Mapping[str, Sequence[ValueOfRecording]]) -> list[ChangeOfBa
         if chance < FALSE_ALARM:
             change = ChangeOfBand(name, earlier, later, float(np.exp(gap)), float(chance))
             ranked.append((-sigmas, change))
-    return [change for _, change in sorted(ranked, key=lambda pair_change: pair_change[0])]
+    return [change for _, change in sorted(ranked, key=lambda rank: rank[0])]
 
 
 def newest(changed: Sequence[ChangeOfBand]) -> int:

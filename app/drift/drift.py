@@ -60,9 +60,11 @@ def drift(settings: Settings, band: str, root: Path | str = ".") -> dict:
     dated = in_time(recordings)
     recordings = dated or recordings
     settled = [number for number, recording in enumerate(recordings) if recording.settled]
-    for of_file in recordings:
-        if not of_file.settled:
-            print(f"warning: left out: the fit of {of_file.file} had not settled", file=sys.stderr)
+    for recording in recordings:
+        if not recording.settled:
+            print(
+                f"warning: left out: the fit of {recording.file} had not settled", file=sys.stderr
+            )
     if len(settled) < 2:
         raise UserError(f"{band}: fewer than two of the recordings could be fitted")
     values = {name: [recordings[i].values[name] for i in settled] for name in COMPARED}

@@ -78,7 +78,7 @@ def over_time(
     entries = [("one recording alone, 90 % interval", mark(color=INK, **style))]
     if new:
         entries.append(("as the band is now", mark(color=NEW, **style)))
-    if not all(of_file.settled for of_file in recordings):
+    if not all(recording.settled for recording in recordings):
         entries.append(("not settled, left out", mark(color=LEFT_OUT, **style)))
     key(figure, entries)
     return figure

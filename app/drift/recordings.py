@@ -82,10 +82,10 @@ def identified(
     result = []
     for file in files:
         key = fingerprint(inputs, sha256(file))
-        if not (of_file := earlier.get(key)):
+        if not (recording := earlier.get(key)):
             say(f"{file}: identifying it alone ...")
-            of_file = _alone(file, key, band, settings)
-        result.append(of_file.model_copy(update={"file": file.name}))
+            recording = _alone(file, key, band, settings)
+        result.append(recording.model_copy(update={"file": file.name}))
     return result
 
 

@@ -82,8 +82,8 @@ def trajectory_of(
     way, place = [], level
     for name, share, time in legs_of(plan.dips, float(np.linalg.norm(drawn))):
         to = share * drawn
-        way_there = leg(name, place, to, plan.pull_speed, closed)
-        way.append(way_there if time is None else Phase(name, to, _ticks(time), closed))
+        phase = leg(name, place, to, plan.pull_speed, closed)
+        way.append(phase if time is None else Phase(name, to, _ticks(time), closed))
         place = to
     approach = leg("approach", start, middle, plan.max_speed, wide)
     held = [
@@ -102,9 +102,7 @@ def trajectory_of(
     )
     pull += [Phase("swing", drawn, _ticks(wait), wide), retreat]
     # The next pull's window begins so long before its tail, and the band is to hang calm by then.
-    before = max(
-        episode.duration - episode.tail, LEAD + sum(leg_held.duration for leg_held in held)
-    )
+    before = max(episode.duration - episode.tail, LEAD + sum(phase.duration for phase in held))
     between = wait + retreat.duration + back.duration + taken
     rest = max(plan.lead_in, CALM + SPARE + before - between)
     again = [back, Phase("lead-in", start, _ticks(rest), wide), *pull]

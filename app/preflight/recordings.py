@@ -57,17 +57,17 @@ def targets(recordings: Sequence[Path], folder: Path) -> dict[Path, Path]:
 
     Raises UserError where two are one.
     """
-    links: dict[Path, Path] = {}
+    places: dict[Path, Path] = {}
     for file in recordings:
         name = bag.name_of(file)
         split = len(bag.parts_of(file)) > 1
         target = folder / (name.replace(".", "_") if split else f"{name}.mcap")
-        if target in links.values():
+        if target in places.values():
             raise UserError(f"{file}: two of the recordings have this name, rename one")
-        links[file] = target
+        places[file] = target
     if len(digests(recordings)) < len(recordings):
         raise UserError(f"two of {', '.join(map(str, recordings))} are the same recording")
-    return links
+    return places
 
 
 def digests(recordings: Sequence[Path]) -> dict[str, Path]:

@@ -83,7 +83,7 @@ def legs_of(plan: Path) -> tuple[list[Leg], Leg]:
 
 def openings(plan: Path) -> list[tuple[float, float]]:
     """When the fingers are commanded [s], and to which distance [m], by gripper.json."""
-    times_open = []
+    commands = []
     for load in json.loads((plan / "gripper.json").read_text()):
         at, gap = load["time_from_start"], 2 * load["command"]["position"]
         if not 0 <= gap <= WIDEST + 1e-9:
@@ -91,8 +91,8 @@ def openings(plan: Path) -> list[tuple[float, float]]:
                 f"{plan}: a Franka's hand opens from 0 to {WIDEST} m, not to {gap:g}: plan with"
                 " plan.gripper.position: finger"
             )
-        times_open.append((at["sec"] + 1e-9 * at["nanosec"], gap))
-    return times_open
+        commands.append((at["sec"] + 1e-9 * at["nanosec"], gap))
+    return commands
 
 
 def aimed(legs: list[Leg], aim: Path) -> list[Leg]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.launch import launched
-from app.observe import interval_at
+from app.observe import prediction_of
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.export.export import replaceable
@@ -66,7 +66,7 @@ def test_launch(params, layout, name) -> None:
 
 def test_what_observe_says_before_and_after(params, layout) -> None:
     path = layout.confidence(BAND, METHOD)
-    assert answers(path, lambda: interval_at(params, BAND, METHOD, DRAW, layout.root)) > 0
+    assert answers(path, lambda: prediction_of(params, BAND, METHOD, DRAW, layout.root)) > 0
 
 
 def test_an_export_is_replaced_where_its_card_says_so(tmp_path: Path) -> None:

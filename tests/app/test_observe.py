@@ -120,18 +120,18 @@ def test_a_launch_outside_its_interval_is_doubted_before_stages_run(
     put, monkeypatch, capsys
 ) -> None:
     summary = {"landing_m": 2.0, "interval_90_m": [1.9, 2.1], "failure": None}
-    monkeypatch.setattr(observe, "interval_at", lambda *_: summary)
+    monkeypatch.setattr(observe, "prediction_of", lambda *_: summary)
     for landing, doubts in ((2.09, 0), (1.91, 0), (2.11, 1), (1.89, 1)):
         answer = put.run((-0.3, -landing / 10), landing)
         assert [one["about"] for one in answer["warnings"]] == ["miss"] * doubts
         assert capsys.readouterr().err.count("lies outside the predicted interval") == doubts
-    monkeypatch.setattr(observe, "interval_at", lambda *_: summary | {"interval_90_m": None})
+    monkeypatch.setattr(observe, "prediction_of", lambda *_: summary | {"interval_90_m": None})
     assert put.run((-0.4, -0.2), 9.0)["warnings"] == []
 
 
 def test_a_launch_that_fails_in_simulation_is_told(put, monkeypatch, capsys) -> None:
     summary = {"landing_m": None, "interval_90_m": None, "failure": "the band is slack"}
-    monkeypatch.setattr(observe, "interval_at", lambda *_: summary)
+    monkeypatch.setattr(observe, "prediction_of", lambda *_: summary)
     (warning,) = put.run()["warnings"]
     assert warning["about"] == "failure" and "counts for nothing" in warning["what"]
     assert capsys.readouterr().err == f"warning: {warning['what']}\n"

@@ -37,8 +37,12 @@ def least_sensitive_draw(landing_map: LandingMap, target: float) -> np.ndarray:
     off = landing - target
     here = off[:-1, :-1]
     hits = grid[:-1, :-1][(here * off[1:, :-1] <= 0) | (here * off[:-1, 1:] <= 0)]
-    slopes = sensitivity(landing_map, hits)
-    return hits[np.nanargmin(slopes)] if np.isfinite(slopes).any() else np.full(2, np.nan)
+    sensitivities = sensitivity(landing_map, hits)
+    return (
+        hits[np.nanargmin(sensitivities)]
+        if np.isfinite(sensitivities).any()
+        else np.full(2, np.nan)
+    )
 
 
 def hit(land: Land, target: float, start: np.ndarray) -> np.ndarray:

@@ -140,15 +140,15 @@ def slopes(
     band, hand = data[0], data[1]
     nodes, colours, width = jacobian.shape[:3]
     moved = y.copy().reshape((nodes, width))
-    base, raised = np.empty((nodes, width)), np.empty((nodes, width))
+    base, nudged = np.empty((nodes, width)), np.empty((nodes, width))
     change(time, moved, base, band, hand)
     for c in range(width):
         for colour in range(colours):
             moved[colour::colours, c] += NUDGE
-            change(time, moved, raised, band, hand)
+            change(time, moved, nudged, band, hand)
             for j in range(colour, nodes, colours):
                 moved[j, c] = y[j * width + c]
                 for i in range(max(j - NEAR, 0), min(j + NEAR + 1, nodes)):
                     for r in range(width):
-                        slope = (raised[i, r] - base[i, r]) / NUDGE
+                        slope = (nudged[i, r] - base[i, r]) / NUDGE
                         jacobian[i, j - i + NEAR, r, c] = slope

@@ -288,17 +288,17 @@ class Rubber:
             Those of rubber that was held for ever at each stretch, and what is remembered: (T, M).
         """
         stress = self.law.stress(stretch)[0]
-        held, stresses = [], []
+        held, remembered = [], []
         if self.flow is not None:
             held.append(np.log(stretch))
-            stresses.append(self._flowed(stretch, step))
+            remembered.append(self._flowed(stretch, step))
         if self.softening is not None:
             energy = self.law.energy(stretch)
             before = self.law.energy(worst)  # pyright: ignore[reportArgumentType]
             most = np.maximum.accumulate(np.maximum(energy, before))
             stress = stress * self._kept(energy, most)
             held.append(energy)
-            stresses.append(most)
+            remembered.append(most)
         decay = np.exp(-step / self.times)
         mean = self.times / step * (1 - decay)
         memory = np.empty((len(stress), len(self.times)))
@@ -307,7 +307,7 @@ class Rubber:
             start, end = stress[i - 1], stress[i]
             memory[i] = decay * memory[i - 1] + (mean - decay) * start + (1 - mean) * end
         relaxed = np.repeat(stress[:, None], len(self.times), axis=1)
-        return np.column_stack([relaxed, *held]), np.column_stack([memory, *stresses])
+        return np.column_stack([relaxed, *held]), np.column_stack([memory, *remembered])
 
     def _flowed(self, stretch: np.ndarray, step: float) -> np.ndarray:
         """e along a history (T,) of equal steps [s]."""

@@ -60,5 +60,5 @@ def test_what_a_variant_says_of_itself_is_in_its_stage(band):
         4 * band.tube.mass.sum()
     )
     straight = VARIANTS["points at rest"](band).text
-    points = [line.split(" = ")[1] for line in straight.splitlines() if "oints = " in line]
+    points = [line.split(" = ")[1] for line in straight.splitlines() if "points = " in line.lower()]
     assert len(set(points)) == 1 and len(points) == 3

@@ -25,11 +25,11 @@ def effects(results: list[dict], switches: list[str], methods: list[str], bands:
     return {
         method: {
             group: {
-                switch: found
+                switch: effect
                 for switch in switches
-                if (found := _effect(by, method, switch, own)) is not None
+                if (effect := _effect(by, method, switch, group_bands)) is not None
             }
-            for group, own in groups.items()
+            for group, group_bands in groups.items()
         }
         for method in methods
     }
@@ -40,21 +40,21 @@ def _effect(by: dict, method: str, switch: str, bands: list[str]) -> dict | None
     if not keys:
         return None
     with_, plain = (
-        [by.get((*key[:2], one, *key[3:]), {}) for key in keys] for one in (switch, AS_IS)
+        [by.get((*key[:2], setting, *key[3:]), {}) for key in keys] for setting in (switch, AS_IS)
     )
-    failed = sum("failed" in one for one in with_)
+    failed = sum("failed" in result for result in with_)
 
     def values(results: list[dict], name: str) -> np.ndarray:
         return np.array([result.get(name) for result in results], float)  # None is NaN
 
-    found = {"runs": len(keys), "failed": failed}
+    effect = {"runs": len(keys), "failed": failed}
     for name in ("youngs_modulus", "peak_force", "force_rms_n", "loss", "miss"):
-        found[name] = mean_interval(values(with_, name))
+        effect[name] = mean_interval(values(with_, name))
     ratio = values(with_, "youngs_modulus") / values(plain, "youngs_modulus") - 1
-    found["youngs_modulus_change"] = mean_interval(ratio)
+    effect["youngs_modulus_change"] = mean_interval(ratio)
     for name in ("peak_force", "miss"):
-        found[f"{name}_change"] = mean_interval(values(with_, name) - values(plain, name))
-    return found
+        effect[f"{name}_change"] = mean_interval(values(with_, name) - values(plain, name))
+    return effect
 
 
 def table(figures: dict, rows: dict[str, str], methods: dict[str, str]) -> list[str]:
@@ -67,49 +67,63 @@ def table(figures: dict, rows: dict[str, str], methods: dict[str, str]) -> list[
     heads = [head for name in methods.values() for head in (f"{name}: E", "force", "miss")]
     lines = [f"| as the paper has it | bands | {' | '.join(heads)} |"]
     lines.append(f"|---|---{'|---:' * len(heads)}|")
-    groups = dict.fromkeys(group for own in figures.values() for group in own)
+    groups = dict.fromkeys(group for group_effects in figures.values() for group in group_effects)
     for switch, words in rows.items():
         for group in sorted(groups, key=lambda name: (name != "rig", name)):
-            own = [figures[method].get(group, {}) for method in methods]
-            if any(switch in one for one in own):
-                cells = [cell for one in own for cell in _cells(one, switch, group)]
+            method_effects = [figures[method].get(group, {}) for method in methods]
+            if any(switch in switch_effects for switch_effects in method_effects):
+                cells = [
+                    cell
+                    for switch_effects in method_effects
+                    for cell in _cells(switch_effects, switch, group)
+                ]
                 lines.append(f"| {words} | {group} | {' | '.join(cells)} |")
     return lines
 
 
-def _cells(found: dict, switch: str, group: str) -> tuple[str, str, str]:
+def _cells(switch_effects: dict, switch: str, group: str) -> tuple[str, str, str]:
     """E, force and miss of one method in a group of bands; changes where there is a setting."""
-    one, unit = found.get(switch), "cm" if group == "rig" else "%"
-    if one is None:
+    effect, unit = switch_effects.get(switch), "cm" if group == "rig" else "%"
+    if effect is None:
         return "", "", ""
-    if not one["miss"]["n"] and not one["youngs_modulus"]["n"]:
-        return ("no θ",) * 3 if one["failed"] else ("", "", "")
-    young, force = _of(one, "youngs_modulus") / 1e5, f"{_of(one, 'peak_force'):+.1f} %"
-    miss = f"{_of(one, 'miss'):.1f} {unit}"
+    if not effect["miss"]["n"] and not effect["youngs_modulus"]["n"]:
+        return ("no θ",) * 3 if effect["failed"] else ("", "", "")
+    young, force = _of(effect, "youngs_modulus") / 1e5, f"{_of(effect, 'peak_force'):+.1f} %"
+    miss = f"{_of(effect, 'miss'):.1f} {unit}"
     if switch == AS_IS:
         return _typeset(f"{young:.0f} kPa", force, miss)
-    moved, low, high = (_of(one, "miss_change", end) for end in ("mean", "low", "high"))
+    moved, low, high = (_of(effect, "miss_change", end) for end in ("mean", "low", "high"))
     change = f"{moved:+.1f}"
-    if one["miss_change"]["n"] > 1:  # a single pair has no interval
+    if effect["miss_change"]["n"] > 1:  # a single pair has no interval
         change += f", {low:+.1f} to {high:+.1f}"
         change = f"**{change}**" if low > 0 or high < 0 else change
-    return _typeset(f"{_of(one, 'youngs_modulus_change'):+.1f} %", force, f"{miss} ({change})")
+    return _typeset(f"{_of(effect, 'youngs_modulus_change'):+.1f} %", force, f"{miss} ({change})")
 
 
 def runs(figures: dict, rows: dict[str, str], methods: dict[str, str]) -> list[str]:
     """Sentences: how many identifications are behind a row, and how many found nothing."""
     summary = []
     for method, name in methods.items():
-        groups = [found for found in figures[method].values() if AS_IS in found]
+        groups = [
+            switch_effects for switch_effects in figures[method].values() if AS_IS in switch_effects
+        ]
         counts = {
-            switch: sum(found[switch]["runs"] for found in groups if switch in found)
+            switch: sum(
+                switch_effects[switch]["runs"]
+                for switch_effects in groups
+                if switch in switch_effects
+            )
             for switch in rows
         }
         usual = counts[AS_IS]
         others = [f"{n} {rows[s]}" for s, n in counts.items() if n not in (0, usual)]
         summary.append(f"{name}: {usual} a row" + "".join(f", {other}" for other in others) + ".")
         for switch, words in rows.items():
-            failed = sum(found[switch]["failed"] for found in groups if switch in found)
+            failed = sum(
+                switch_effects[switch]["failed"]
+                for switch_effects in groups
+                if switch in switch_effects
+            )
             if failed:
                 summary.append(f"{name}, {words}: {failed} of {counts[switch]} found no θ.")
     return summary

@@ -42,19 +42,19 @@ KEPT = (
 
 def main(target: str, bands: list[str]) -> None:
     """Export, replay, write. Raises UserError."""
-    params, found = load(), {}
+    params, cards = load(), {}
     for band in bands or params.run.bands:
         with tempfile.TemporaryDirectory() as folder:
             model = Identification.of_run(band, params.run.methods[0])
             episode = Episode.load_all(Layout().episodes(band))[0]
             card = export(model, target, folder, episode=episode).card
-        found[band] = {name: card[name] for name in KEPT if name in card}
+        cards[band] = {name: card[name] for name in KEPT if name in card}
         print(f"{band}: {'met' if card['met'] else 'NOT met'}", flush=True)
-    about = environment("cpu", COMMANDS[target])
-    about["versions"] |= {name: version(name) for name in PACKAGES[target]}
-    met = all(one["met"] for one in found.values())
+    provenance = environment("cpu", COMMANDS[target])
+    provenance["versions"] |= {name: version(name) for name in PACKAGES[target]}
+    met = all(card["met"] for card in cards.values())
     report = REPORTS / f"export-{target}.json"
-    write_json(report, {"asked": ASKED, "met": met, "bands": found, **about})
+    write_json(report, {"asked": ASKED, "met": met, "bands": cards, **provenance})
 
 
 if __name__ == "__main__":

@@ -69,7 +69,7 @@ def listed(
         UserError: There are none, or one of them is no JSON object.
     """
     reports = root / "reports"
-    files = list(dict.fromkeys(one for kind in PATTERNS for one in sorted(reports.glob(kind))))
+    files = list(dict.fromkeys(file for kind in PATTERNS for file in sorted(reports.glob(kind))))
     if not files:
         raise UserError(f"{reports}: no figures; run this in the project's folder")
     at = root / "params.yaml"
@@ -97,9 +97,9 @@ def shown(figures: list[CommittedFigures]) -> str:
         for row in rows
     ]
     counts = [sum(figure.state == state for figure in figures) for state in (TODAY, OLDER)]
-    known = f"{counts[0]} of {len(figures)} are of today's code, {counts[1]} of older code"
+    counted = f"{counts[0]} of {len(figures)} are of today's code, {counts[1]} of older code"
     unmet = sum(figure.met is False for figure in figures)
-    return "\n".join([*lines, "", f"{known}; {unmet} do not meet what they ask"])
+    return "\n".join([*lines, "", f"{counted}; {unmet} do not meet what they ask"])
 
 
 def as_json(figures: list[CommittedFigures]) -> str:
@@ -115,29 +115,29 @@ def _figures(file: Path, root: Path, code: Path, state: str | None) -> Committed
         raise UserError(f"{name}: cannot be read: {error}") from error
     if not isinstance(content, dict):
         raise UserError(f"{name}: must hold a JSON object")
-    known = content.get("code") or {}
-    if not known and isinstance(content.get("simulator"), str):
-        known = {SIMULATOR: content["simulator"]}
-    changed = [part for part, retained in known.items() if digest(code / part) != retained]
+    code_digests = content.get("code") or {}
+    if not code_digests and isinstance(content.get("simulator"), str):
+        code_digests = {SIMULATOR: content["simulator"]}
+    changed = [part for part, retained in code_digests.items() if digest(code / part) != retained]
     if not state and changed:
         state = OLDER
     elif not state:
         state = TODAY if content.get("code") else _by_commit(content, code)
-    return CommittedFigures(name, state, _together(known), changed, _met(content))
+    return CommittedFigures(name, state, _together(code_digests), changed, _met(content))
 
 
-def _together(known: dict[str, str]) -> str | None:
+def _together(code_digests: dict[str, str]) -> str | None:
     """One digest of several."""
-    if len(known) < 2:
-        return next(iter(known.values()), None)
-    return fingerprint(json.dumps(known, sort_keys=True))[:12]
+    if len(code_digests) < 2:
+        return next(iter(code_digests.values()), None)
+    return fingerprint(json.dumps(code_digests, sort_keys=True))[:12]
 
 
 def _met(content: dict) -> bool | None:
     """Whether a campaign met what it asks, or a verification kept all its limits."""
     if isinstance(content.get("met"), bool):
         return content["met"]
-    checks = [one for part in content.get("sections", []) for one in part.get("checks", [])]
+    checks = [check for part in content.get("sections", []) for check in part.get("checks", [])]
     limited = [check["met"] for check in checks if check.get("met") is not None]
     return all(limited) if limited else None
 
@@ -183,5 +183,5 @@ def _stage(file: Path, root: Path, params: Params | None) -> str | None:
         return "report"
     if parts[0] != "bands":
         return None
-    known = stage_of(params, "card", parts[1]) if params else None
-    return known or f"card@{parts[1]}"
+    stage = stage_of(params, "card", parts[1]) if params else None
+    return stage or f"card@{parts[1]}"

@@ -29,14 +29,14 @@ def with_block(page: str, block: str) -> str:
     return head + block + rest.split(end)[1]
 
 
-def compared_or_fixed(page: Path, drawn: Callable[[str], str], about: str | None) -> int:
+def compared_or_fixed(page: Path, drawn: Callable[[str], str], docstring: str | None) -> int:
     """The command of a page with a drawn block: exit status 1 if it is out of date, or `--fix`.
 
     Args:
         drawn: The page's text with today's block.
-        about: The script's docstring.
+        docstring: The script's docstring.
     """
-    parser = argparse.ArgumentParser(description=str(about).partition("\n")[0])
+    parser = argparse.ArgumentParser(description=str(docstring).partition("\n")[0])
     parser.add_argument("--fix", action="store_true", help="write it anew")
     text = page.read_text(encoding="utf-8")
     if parser.parse_args().fix:

@@ -60,8 +60,8 @@ class OwnLaw:
 
 def drawn(params: Params, method: str, dips: Sequence[Dip], rng: np.random.Generator) -> OwnLaw:
     """A band of the first one's size, pulled with dips."""
-    name, about = next(iter(params.bands)), params.methods[method]
-    sling = ClampedBand.of(params.bands[name], params.setup, params.sling, law=about.law)
+    name, method_params = next(iter(params.bands)), params.methods[method]
+    sling = ClampedBand.of(params.bands[name], params.setup, params.sling, law=method_params.law)
     coordinates = Coordinates.of_method(params, method, sling)
     hang = np.sqrt(max(sling.rest_length**2 / 4 - sling.half_width**2, 0.0))
     times = {"pull_time": PULL_TIME, "pause": PAUSE}
@@ -71,7 +71,7 @@ def drawn(params: Params, method: str, dips: Sequence[Dip], rng: np.random.Gener
         plan, cloud_time=plan.cloud_time + late, metadata={"preprocessing": dict(CLOCKS)}
     )
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
-    model = Likelihood(plan, sling, cutoff, about.fixed["dynamic_friction"])
+    model = Likelihood(plan, sling, cutoff, method_params.fixed["dynamic_friction"])
     while True:
         phi = coordinates.quantiles(rng.random((1, len(coordinates.names))))[0]
         try:
@@ -143,23 +143,23 @@ def ranked(params: Params, method: str, dips: Sequence[Dip], seed: Sequence[int]
         the recoil [s].
     """
     rng = np.random.default_rng(seed)
-    own = drawn(params, method, dips, rng)
-    outcome, confidence = calibrated_by(params, method, own.sling, [own.episode])
-    names, samples = own.coordinates.names, outcome.samples
+    virtual_band = drawn(params, method, dips, rng)
+    outcome, confidence = calibrated_by(params, method, virtual_band.sling, [virtual_band.episode])
+    names, samples = virtual_band.coordinates.names, outcome.samples
     assert samples is not None and outcome.coordinates is not None
     draw = np.array([rng.uniform(*LAUNCHES[0]), rng.uniform(*LAUNCHES[1])])
     off = rng.normal(0, params.trials.actuation_error, (len(samples) + 1, 2))
-    truth = own.coordinates.parameters(own.phi[None])
+    truth = virtual_band.coordinates.parameters(virtual_band.phi[None])
     landed = outcome(draw + off[:1], truth).landing_y[0]
     landings = outcome(draw + off[1:], samples).landing_y
-    below = part_below(outcome.coordinates, own.phi)
+    below = part_below(outcome.coordinates, virtual_band.phi)
     if np.isfinite(landed) and np.isfinite(landings).mean() > LANDED:
         launch = float(part_below(landings[np.isfinite(landings)], landed))
     else:
         launch = np.nan
     return {
         "below": dict(zip(names, below, strict=True)) | {"landing": launch},
-        "truth": dict(zip(names, own.phi, strict=True)),
+        "truth": dict(zip(names, virtual_band.phi, strict=True)),
         "settled": confidence["settled"],
         "pictures": confidence["recordings"][0]["pictures"],
     }

@@ -49,15 +49,15 @@ def compared(values: dict[str, np.ndarray], reference: str) -> dict[str, dict]:
         methods here. A method without a pair, or that never differs, has p = 1.
     """
     base = np.asarray(values[reference], float)
-    found = {}
-    for name, own in values.items():
+    differences = {}
+    for name, method_values in values.items():
         if name == reference:
             continue
-        difference = np.asarray(own, float) - base
+        difference = np.asarray(method_values, float) - base
         difference = difference[np.isfinite(difference)]
         p = float(wilcoxon(difference).pvalue) if np.any(difference) else 1.0
-        found[name] = mean_interval(difference) | {"p": p}
-    adjusted = holm(np.array([one["p"] for one in found.values()]))
-    for one, value in zip(found.values(), adjusted, strict=True):
-        one["p_holm"] = float(value)
-    return found
+        differences[name] = mean_interval(difference) | {"p": p}
+    adjusted = holm(np.array([row["p"] for row in differences.values()]))
+    for row, value in zip(differences.values(), adjusted, strict=True):
+        row["p_holm"] = float(value)
+    return differences

@@ -92,17 +92,17 @@ def run_of(
     bands: Sequence[str], methods: Sequence[str], ablations: Sequence[str] = ()
 ) -> dict[str, object]:
     """Keys of `run`: bands of the rig, methods, and further methods on the first band."""
-    known = load(DEFAULTS).methods
+    default_methods = load(DEFAULTS).methods
     first = [*bands[:1]] if ablations else []
     further = {"bands": first, "rig": first, "methods": [*ablations]}
     return {
         "run.bands": [*bands],
         "run.rig": [*bands],
         "run.methods": [*methods],
-        "run.steps": methods_by_step(methods, known),
+        "run.steps": methods_by_step(methods, default_methods),
         "run.dips": [],
-        "run.own_steps": methods_by_step(methods[:1], known),
-        "run.ablations": further | {"steps": methods_by_step(ablations, known)},
+        "run.own_steps": methods_by_step(methods[:1], default_methods),
+        "run.ablations": further | {"steps": methods_by_step(ablations, default_methods)},
     }
 
 
@@ -123,8 +123,8 @@ class ProjectCopy:
 
     def __call__(self, *command: str) -> str:
         """What a command prints. Raises AssertionError where it fails."""
-        about = {"cwd": self.folder, "env": self.environment, "capture_output": True}
-        done = subprocess.run(command, text=True, timeout=1200, **about)
+        options = {"cwd": self.folder, "env": self.environment, "capture_output": True}
+        done = subprocess.run(command, text=True, timeout=1200, **options)
         assert done.returncode == 0, f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}"
         self.errors = done.stderr
         return done.stdout
@@ -186,15 +186,15 @@ class MarkedRun:
 
 def marked(name: str, value: str) -> list[psutil.Process]:
     """Processes with a variable in their environment; zombies, which wait for a parent, apart."""
-    found = []
+    processes = []
     for process in psutil.process_iter():
         try:
             zombie = process.status() == psutil.STATUS_ZOMBIE
             if not zombie and process.environ().get(name) == value:
-                found.append(process)
+                processes.append(process)
         except (psutil.NoSuchProcess, psutil.AccessDenied):
             continue
-    return found
+    return processes
 
 
 def command_line(process: psutil.Process) -> str:

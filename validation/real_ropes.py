@@ -99,7 +99,7 @@ def main() -> None:
         if name in DEFORM:
             start, least = DEFORM[name]
             ropes[name]["deform_mean_coordinate_mm"] = {"at_the_start": start, "least": least}
-    one = min(runs)
+    rope = min(runs)
     content = {
         "kind": "measured by others, slack swing",
         "asked": "Does the rod swing as real ropes do: three numbers fitted to one run, another"
@@ -108,7 +108,7 @@ def main() -> None:
         "fitted_s": FITTED / RATE,
         "values_are": "bending length [m], damping time of bending [s], drag over mass and speed"
         " [1/s]",
-        "finer": {one: finer(runs[one][1], ropes[one], size, chords_of(runs[one][:1]))},
+        "finer": {rope: finer(runs[rope][1], ropes[rope], size, chords_of(runs[rope][:1]))},
         "ropes": ropes,
     }
     figures.draw_ropes(FIGURES, {name: two[1] for name, two in runs.items()}, summary, content)

@@ -44,7 +44,7 @@ def rounded(values: dict[str, float]) -> dict[str, float]:
 
 def silicones(folder: Path) -> dict:
     """Fits of each specimen up to each of TOPS."""
-    found = {}
+    specimens = {}
     for whole in data.silicones(folder):
         rows = {}
         for top in TOPS:
@@ -53,16 +53,16 @@ def silicones(folder: Path) -> dict:
             rows[f"{top:g}"] = rounded(
                 {"rms_percent": fit.rms, "noise_percent": fits.noise_of(curve)} | fit.values
             )
-        found[whole.name] = rows
-    return found
+        specimens[whole.name] = rows
+    return specimens
 
 
-def silicones_summary(found: dict) -> dict:
+def silicones_summary(specimens: dict) -> dict:
     """Medians and worst ones, and who is off by more than 2 % and 1.3 times its noise."""
     result = {}
     for top in map("{:g}".format, TOPS):
-        rms = {name: rows[top]["rms_percent"] for name, rows in found.items()}
-        noise = {name: rows[top]["noise_percent"] for name, rows in found.items()}
+        rms = {name: rows[top]["rms_percent"] for name, rows in specimens.items()}
+        noise = {name: rows[top]["noise_percent"] for name, rows in specimens.items()}
         result[top] = {
             "median_rms_percent": float(np.median([*rms.values()])),
             "worst": max(rms, key=lambda name: rms[name]),
@@ -76,7 +76,7 @@ def silicones_summary(found: dict) -> dict:
 
 def multiaxial(folder: Path) -> dict:
     """Shape from the uniaxial mode up to a stretch of 2.5; what it predicts of the others."""
-    found = {}
+    sources = {}
     for source, modes in data.multiaxial(folder).items():
         rows = modes["UT"]
         rows = rows[(rows[:, 0] >= 1) & (rows[:, 0] <= 2.5)]
@@ -92,13 +92,13 @@ def multiaxial(folder: Path) -> dict:
             off = (summary - measured)[np.isfinite(measured)]
             peak = np.nanmax(np.abs(measured))
             predicted[mode] = float(f"{100 * np.sqrt(np.mean(off**2)) / peak:.3g}")
-        found[source] = {
+        sources[source] = {
             "uniaxial_points": len(rows),
             "uniaxial_rms_percent": float(f"{fit.rms:.3g}"),
             "values": rounded(fit.values),
             "predicted_rms_percent": predicted,
         }
-    return found
+    return sources
 
 
 def latex(folder: Path) -> dict:
@@ -140,15 +140,15 @@ def latex(folder: Path) -> dict:
             "relaxation_per_decade": float(q[3]),
         }
 
-    found = {"whole": rounded(miss(fit(LONG * 2)))}
+    misses = {"whole": rounded(miss(fit(LONG * 2)))}
     for until in FIRST:
-        found[f"forecast_from_{until:g}_s"] = rounded(miss(fit(until)))
-    return found
+        misses[f"forecast_from_{until:g}_s"] = rounded(miss(fit(until)))
+    return misses
 
 
 def acrylic(folder: Path) -> dict:
     """Cycles at three rates and holds up to a stretch of 2.5: with and without softening."""
-    curves = [one for one in data.acrylic(folder) if one.stretch.max() <= 2.51]
+    curves = [curve for curve in data.acrylic(folder) if curve.stretch.max() <= 2.51]
     result = {}
     for name, free in {
         "all": fits.NAMES,
@@ -156,10 +156,10 @@ def acrylic(folder: Path) -> dict:
     }.items():
         done = fits.memory_of(curves, free)
         result[name] = {
-            "rms_percent": float(f"{np.sqrt(np.mean([one.rms**2 for one in done])):.3g}"),
+            "rms_percent": float(f"{np.sqrt(np.mean([fit.rms**2 for fit in done])):.3g}"),
             "values": rounded(done[0].values),
             "by_history": {
-                c.name: float(f"{one.rms:.3g}") for c, one in zip(curves, done, strict=True)
+                c.name: float(f"{fit.rms:.3g}") for c, fit in zip(curves, done, strict=True)
             },
         }
     return result

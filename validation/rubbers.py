@@ -48,9 +48,9 @@ def rubbers(seed: int) -> dict[str, tuple[dict, dict]]:
     Each kind of relaxation comes equally often, each law too, in an order that the seed draws.
     """
     rng, count = np.random.default_rng(seed), COUNT[seed]
-    every, known = (KINDS, LAWS) if seed == DEVELOP else (UNSEEN_KINDS, UNSEEN_LAWS)
+    every, law_names = (KINDS, LAWS) if seed == DEVELOP else (UNSEEN_KINDS, UNSEEN_LAWS)
     kinds = rng.permutation(np.resize(every, count))
-    laws = rng.permutation(np.resize(list(known), count))
+    laws = rng.permutation(np.resize(list(law_names), count))
     word = {DEVELOP: "develop", SEALED: "sealed"}[seed]
     return {
         f"{word}{number + 1}": _rubber(str(kind), str(law), rng)
@@ -70,13 +70,13 @@ def _rubber(kind: str, law: str, rng: np.random.Generator) -> tuple[dict, dict]:
     diameter = between(0.008, 0.012)
     mass = near(np.pi / 4 * diameter**2 * 0.52 * 750, 0.3)
     constants, share = (LAWS | UNSEEN_LAWS)[law]
-    about = {
+    rig_params = {
         "like": None,
         "pull": None,
         "peak_force": between(10.0, 17.0),
         "relaxation": [],
         "viscosity": between(0.0005, 0.0025, log=True),
-        "color": [float(f"{one:.2f}") for one in hsv_to_rgb(rng.random(), 0.8, 0.85)],
+        "color": [float(f"{channel:.2f}") for channel in hsv_to_rgb(rng.random(), 0.8, 0.85)],
         "law": law,
         "constants": [near(constant, share) for constant in constants],
         "spectrum": None,
@@ -86,9 +86,9 @@ def _rubber(kind: str, law: str, rng: np.random.Generator) -> tuple[dict, dict]:
     slope = between(0.25, 0.4) if kind == "wedge" else between(0.0, 0.1)
     weight = between(0.08, 0.2) if kind in ("box", "wedge") else between(0.03, 0.08)
     times = [between(0.001, 0.004), between(3.0, 30.0)]
-    about["spectrum"] = {"weight": weight, "times": times, "branches": 7, "slope": slope}
+    rig_params["spectrum"] = {"weight": weight, "times": times, "branches": 7, "slope": slope}
     if kind == "flow":
-        about["flow"] = {
+        rig_params["flow"] = {
             "share": between(0.1, 0.3),
             "rate": between(100.0, 3000.0, log=True),
             "power": between(3.0, 5.0),
@@ -96,12 +96,16 @@ def _rubber(kind: str, law: str, rng: np.random.Generator) -> tuple[dict, dict]:
             "offset": 0.01,
         }
     if kind == "softening":
-        about["softening"] = {"damage": near(2.5, 0.3), "energy": near(0.1, 0.3), "growth": 0.1}
+        rig_params["softening"] = {
+            "damage": near(2.5, 0.3),
+            "energy": near(0.1, 0.3),
+            "growth": 0.1,
+        }
     if kind == "strain":
         lost = {"damage": near(4.0, 0.4), "energy": near(0.3, 0.3), "growth": 0.0}
-        about["softening"] = {"form": "strain"} | lost
+        rig_params["softening"] = {"form": "strain"} | lost
     band = {"source": "rig", "mass": float(f"{mass:.3g}"), "diameter": diameter}
-    return band | {"rest_length": 0.52}, about
+    return band | {"rest_length": 0.52}, rig_params
 
 
 def with_rubbers(

@@ -91,9 +91,9 @@ def _steps(view: View, cloud: object) -> tuple[dict[str, float], list[int]]:
             continue
         frame, seconds, _ = timed(partial(view.frame_of, number, *pictures))
         spent["points"] += seconds
-        found, seconds, _ = timed(partial(mask.mask, frame))
+        band_mask, seconds, _ = timed(partial(mask.mask, frame))
         spent["mask"] += seconds
-        points, seconds, _ = timed(partial(cloud_of, view, frame, found, cloud))
+        points, seconds, _ = timed(partial(cloud_of, view, frame, band_mask, cloud))
         spent["cloud"] += seconds
         sizes.append(len(points))
     return spent, sizes

@@ -57,15 +57,15 @@ def measured(
 
 def _family(process: psutil.Process, seen: Iterable[psutil.Process]) -> list[psutil.Process]:
     """A process and its descendants, with those whose parents have ended since."""
-    found: dict[int, psutil.Process] = {}
-    for one in (process, *seen):
-        if one.pid in found:
+    processes: dict[int, psutil.Process] = {}
+    for ancestor in (process, *seen):
+        if ancestor.pid in processes:
             continue
         try:
-            found |= {each.pid: each for each in (one, *one.children(recursive=True))}
+            processes |= {each.pid: each for each in (ancestor, *ancestor.children(recursive=True))}
         except psutil.NoSuchProcess:
             continue
-    return [*found.values()]
+    return [*processes.values()]
 
 
 def _memory(process: psutil.Process) -> int:
@@ -77,8 +77,8 @@ def _memory(process: psutil.Process) -> int:
 
 def disk(path: Path) -> int:
     """Bytes on the disk of a file or folder, of a file with several names once."""
-    found = {}
-    for one in [path, *path.rglob("*")] if path.exists() else []:
-        about = one.lstat()
-        found[about.st_dev, about.st_ino] = 512 * about.st_blocks
-    return sum(found.values())
+    sizes = {}
+    for entry in [path, *path.rglob("*")] if path.exists() else []:
+        status = entry.lstat()
+        sizes[status.st_dev, status.st_ino] = 512 * status.st_blocks
+    return sum(sizes.values())

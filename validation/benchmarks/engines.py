@@ -93,9 +93,9 @@ def _newton(sling: ClampedBand, episode, ours: dict, device: str) -> dict:
     path = hand_path(episode, times, tube.clamped[tube.middle, 0])
     options = {"step": PEER_STEP, "iterations": VBD_ITERATIONS, "device": device}
     try:
-        one = Bands(tube, THETA, 1, path, **options)
-        one.run(4)  # compiles
-        _, cpu, wall = timed(lambda: one.run(drawn - 4))
+        single_band = Bands(tube, THETA, 1, path, **options)
+        single_band.run(4)  # compiles
+        _, cpu, wall = timed(lambda: single_band.run(drawn - 4))
         per_step, counted = cpu / (drawn - 4), drawn - 4
         if kind == "cuda":
             many = Bands(tube, THETA, count, path, **options)
@@ -108,7 +108,7 @@ def _newton(sling: ClampedBand, episode, ours: dict, device: str) -> dict:
         "newton", version("newton"), device, per_step * whole,
         f"VBD, {count} x 900 tetrahedra, {VBD_ITERATIONS} iterations, {PEER_STEP:g} s; timed"
         f" {counted} of {whole} steps",
-        _force_error(sling, episode, one.forces()[0]),
+        _force_error(sling, episode, single_band.forces()[0]),
         ours,
     )  # fmt: skip
 

@@ -96,14 +96,14 @@ def time_search(
 ) -> tuple[dict, History]:
     """One search from nothing, all its rollouts counted; and what it evaluated."""
     params = params.model_copy(update={"optimizer": optimizer})
-    about = params.methods[method]
-    sling = replace(sling, law=about.law)
+    method_params = params.methods[method]
+    sling = replace(sling, law=method_params.law)
 
     def whole(evaluate) -> tuple[History, int]:
         history = evaluations_of(params, method, evaluate)
-        if about.search != LEAST_SQUARES:
+        if method_params.search != LEAST_SQUARES:
             return history, len(history.total)
-        start = history.best_parameters(about.law)
+        start = history.best_parameters(method_params.law)
         fit = fit_posterior(params, method, sling, [episode], start, workers=os.cpu_count())
         return history, len(history.total) + fit.rollouts
 
@@ -114,7 +114,9 @@ def time_search(
         evaluate, before = Clocked(cache), busy()
         (history, count), cpu, wall = timed(partial(whole, evaluate))
     row = {
-        "regions": regions_asked(about, optimizer) if about.search == "multistart" else 0,
+        "regions": regions_asked(method_params, optimizer)
+        if method_params.search == "multistart"
+        else 0,
         "rollouts": count,
         "failed": int(np.isinf(history.total).sum()),
         "seconds": wall,

@@ -57,7 +57,7 @@ def full(folder: Path, device: str) -> dict:
 
     torch.manual_seed(0)
     model = Sam3VideoModel(Sam3VideoConfig())
-    about = {
+    figures = {
         "parameters": sum(parameter.numel() for parameter in model.parameters()),
         "image": model.config.image_size,
     }
@@ -69,8 +69,8 @@ def full(folder: Path, device: str) -> dict:
         torch.cuda.reset_peak_memory_stats()
         _, _, seconds = timed(lambda view=view: masker(view, folder, device))
         memory = torch.cuda.max_memory_allocated()
-        about[f"{count} pictures"] = {"seconds": seconds, "gpu_gb": memory / 1e9}
-    return about
+        figures[f"{count} pictures"] = {"seconds": seconds, "gpu_gb": memory / 1e9}
+    return figures
 
 
 def main() -> None:
@@ -78,15 +78,15 @@ def main() -> None:
     parser.add_argument("--device", default="cuda:0", help="a GPU (default: cuda:0)")
     parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
     args = parser.parse_args()
-    about = environment(args.device, "python -m validation.benchmarks.sam3")
-    about["versions"] |= {name: version(name) for name in ("torch", "transformers")}
+    provenance = environment(args.device, "python -m validation.benchmarks.sam3")
+    provenance["versions"] |= {name: version(name) for name in ("torch", "transformers")}
     with tempfile.TemporaryDirectory() as folder:
         content = {
             "weights": "random",
             "tiny": tiny(Path(folder, "tiny"), args.device),
             "real": full(Path(folder, "real"), args.device),
         }
-    write_json(args.report, content | about)
+    write_json(args.report, content | provenance)
     print(f"{args.report}: {content}")
 
 

@@ -124,8 +124,8 @@ def _compared(
     for work in works:
         result, _, wall = timed(work)
         walls.append(min(wall, seconds(work, REPEATS - 1)))
-        found = numbers(result)
-        equal.append(all(map(_same, found, first)))
+        arrays = numbers(result)
+        equal.append(all(map(_same, arrays, first)))
     return _row(teams, walls, equal)
 
 
@@ -138,20 +138,25 @@ def _row(teams: list[Sequence[str]], walls: list[float], equal: list[bool]) -> d
     }
 
 
-def _same(one: np.ndarray, other: np.ndarray) -> bool:
-    return np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
+def _same(array: np.ndarray, other: np.ndarray) -> bool:
+    return np.array_equal(array, other, equal_nan=array.dtype.kind == "f")
 
 
-def _evaluated(one: Evaluation) -> list[np.ndarray]:
-    return [one.total, *one.terms.values(), np.array(one.failure, str)]
+def _evaluated(evaluation: Evaluation) -> list[np.ndarray]:
+    return [evaluation.total, *evaluation.terms.values(), np.array(evaluation.failure, str)]
 
 
-def _searched(one: History) -> list[np.ndarray]:
-    return [one.unit, one.total, *(one.table[name].to_numpy() for name in TERMS)]
+def _searched(history: History) -> list[np.ndarray]:
+    return [history.unit, history.total, *(history.table[name].to_numpy() for name in TERMS)]
 
 
-def _launched(one: Launches) -> list[np.ndarray]:
-    return [one.landing_y, one.hold_force, one.separation_time, np.array(one.failure, str)]
+def _launched(launches: Launches) -> list[np.ndarray]:
+    return [
+        launches.landing_y,
+        launches.hold_force,
+        launches.separation_time,
+        np.array(launches.failure, str),
+    ]
 
 
 def table(result: dict) -> str:
@@ -165,8 +170,8 @@ def table(result: dict) -> str:
     width = max(len(name) for name, _ in rows)
     lines = [f"band {result['band']}", "  ".join([" " * width, "devices", "seconds", "speedup"])]
     for name, row in rows:
-        for one in row["devices"]:
-            cells = f"{one['count']:7}  {one['seconds']:7.2f}  {one['speedup']:7.2f}"
-            lines.append(f"{name:{width}}  {cells}{'' if one['equal'] else '  NOT EQUAL'}")
+        for timing in row["devices"]:
+            cells = f"{timing['count']:7}  {timing['seconds']:7.2f}  {timing['speedup']:7.2f}"
+            lines.append(f"{name:{width}}  {cells}{'' if timing['equal'] else '  NOT EQUAL'}")
             name = ""
     return "\n".join(lines)

@@ -83,19 +83,19 @@ class Project:
     def steps(self) -> dict[str, tuple[str, str]]:
         """By step, its first stage and the command of that, as dvc.lock has them."""
         text = (self.folder / "dvc.lock").read_text(encoding="utf-8")
-        found: dict[str, tuple[str, str]] = {}
+        first_stages: dict[str, tuple[str, str]] = {}
         for name, entry in YAML(typ="safe").load(text)["stages"].items():
-            found.setdefault(name.partition("@")[0], (name, entry["cmd"]))
-        return found
+            first_stages.setdefault(name.partition("@")[0], (name, entry["cmd"]))
+        return first_stages
 
 
 def profile(project: Project, steps: Sequence[str]) -> dict[str, dict]:
     """Parts of each step's time; its stage runs once."""
-    known, interpreter, found = project.steps(), project.python("-c", "pass"), {}
-    if unknown := sorted({*steps} - known.keys()):
-        raise UserError(f"--steps {' '.join(unknown)}: there are {', '.join(known)}")
-    for step in steps or known:
-        name, command = known[step]
+    stages, interpreter, profiles = project.steps(), project.python("-c", "pass"), {}
+    if unknown := sorted({*steps} - stages.keys()):
+        raise UserError(f"--steps {' '.join(unknown)}: there are {', '.join(stages)}")
+    for step in steps or stages:
+        name, command = stages[step]
         words = ["/bin/sh", "-c", command]
         _, message = project.cpu(words, PYTHONPROFILEIMPORTTIME="1")  # which takes its own time
         modules = list(dict.fromkeys(IMPORT.findall(message.stderr)))
@@ -103,16 +103,16 @@ def profile(project: Project, steps: Sequence[str]) -> dict[str, dict]:
             project.cpu(words)[0],
             project.python("-c", IMPORTS, given=" ".join(modules)),
         )
-        found[step] = {
+        profiles[step] = {
             "stage": name,
             "interpreter_s": round(interpreter, 2),
             "imports_s": round(max(imports - interpreter, 0.0), 2),
             "work_s": round(max(whole - max(imports, interpreter), 0.0), 2),
             "dvc_s": round(project.dvc("repro", "-s", name), 2),
-            "heavy": [one for one in HEAVY if one in modules],
+            "heavy": [module for module in HEAVY if module in modules],
         }
-        print(f"{step}: {found[step]}", file=sys.stderr, flush=True)
-    return found
+        print(f"{step}: {profiles[step]}", file=sys.stderr, flush=True)
+    return profiles
 
 
 def again(project: Project) -> dict[str, float]:
@@ -125,11 +125,11 @@ def again(project: Project) -> dict[str, float]:
     }
 
 
-def updated(path: Path, side: str, found: Mapping, command: str) -> dict:
+def updated(path: Path, side: str, figures: Mapping, command: str) -> dict:
     """The report with what was found for one side; what the other one has stays."""
     before = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
     sides = {name: before[name] for name in ("before", "after") if name in before}
-    return environment("cpu", command) | sides | {side: {**sides.get(side, {}), **found}}
+    return environment("cpu", command) | sides | {side: {**sides.get(side, {}), **figures}}
 
 
 def main() -> None:
@@ -142,13 +142,13 @@ def main() -> None:
     project = Project(arguments.project.resolve())
     if not (project.folder / "dvc.lock").is_file():
         raise UserError(f"{arguments.project}: no dvc.lock here; give a copy with a run's data")
-    found: dict = {"commit": commit(project.folder)}
+    figures: dict = {"commit": commit(project.folder)}
     if not arguments.steps:  # else the other stages may be stale
-        found["again_s"] = again(project)
+        figures["again_s"] = again(project)
     if not arguments.idle:
-        found["steps"] = profile(project, arguments.steps)
+        figures["steps"] = profile(project, arguments.steps)
     command = f"python -m validation.benchmarks.stages --project FOLDER --as {arguments.side}"
-    write_json(REPORT, updated(REPORT, arguments.side, found, command))
+    write_json(REPORT, updated(REPORT, arguments.side, figures, command))
 
 
 if __name__ == "__main__":

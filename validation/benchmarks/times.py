@@ -116,36 +116,42 @@ def surroundings(folder: Path) -> dict[str, str]:
     for name in CHANGES:
         ours.pop(name, None)
     if sys.prefix != sys.base_prefix:
-        own = str(Path(sys.prefix, "bin"))
-        ours["PATH"] = os.pathsep.join(one for one in ours["PATH"].split(os.pathsep) if one != own)
+        venv_bin = str(Path(sys.prefix, "bin"))
+        ours["PATH"] = os.pathsep.join(
+            directory for directory in ours["PATH"].split(os.pathsep) if directory != venv_bin
+        )
     cache = folder / "cache"
     return {**ours, "XDG_CACHE_HOME": str(cache), "DVC_SITE_CACHE_DIR": str(cache / "dvc")}
 
 
 def seconds_of_stages(log: str) -> dict[str, dict]:
     """Seconds of the stages that a flow ran, by their script: how many, the median, the longest."""
-    found: dict[str, list[float]] = {}
+    durations: dict[str, list[float]] = {}
     for step, minutes, seconds in STAGE.findall(GROUP.sub("", log)):
-        found.setdefault(step, []).append(60 * int(minutes or 0) + float(seconds))
+        durations.setdefault(step, []).append(60 * int(minutes or 0) + float(seconds))
     return {
-        step: {"count": len(own), "median_s": statistics.median(own), "most_s": max(own)}
-        for step, own in found.items()
+        step: {
+            "count": len(seconds_each),
+            "median_s": statistics.median(seconds_each),
+            "most_s": max(seconds_each),
+        }
+        for step, seconds_each in durations.items()
     }
 
 
 def seconds_of_fit(folder: Path) -> dict[str, int]:
     """Seconds of the steps of the fit in a clone, by the log that it left there."""
-    found: dict[str, int] = {}
+    durations: dict[str, int] = {}
     for path in sorted((folder / "logs" / "runs").glob("*.jsonl")):
         events = [json.loads(line) for line in path.read_text("utf-8").splitlines()]
         if events[0]["command"] != "sling fit":
             continue
-        begun = {one["stage"]: one["at"] for one in events if one["what"] == "stage"}
+        begun = {row["stage"]: row["at"] for row in events if row["what"] == "stage"}
         for event in events:
             if event["what"] == "ended" and event.get("stage") in begun:
                 step = GROUP.sub("", event["stage"].partition("@")[0])
-                found[step] = max(round(event["at"] - begun[event["stage"]]), 1)
-    return found
+                durations[step] = max(round(event["at"] - begun[event["stage"]]), 1)
+    return durations
 
 
 def perform(step: MeasuredStep, done: dict[str, dict], folder: Path) -> dict:
@@ -166,8 +172,8 @@ def perform(step: MeasuredStep, done: dict[str, dict], folder: Path) -> dict:
         last = (message.strip().splitlines() or [""])[-1]
         result["why"] = f"status {result['status']}: {errors.one_line(last)[:200]}"
     result["disk_bytes"] = {name: disk(clone / name) for name in step.makes}
-    if found := seconds_of_stages(message):
-        result["stages"] = found
+    if stages := seconds_of_stages(message):
+        result["stages"] = stages
     write_json(result_file, result)
     return result
 
@@ -175,12 +181,12 @@ def perform(step: MeasuredStep, done: dict[str, dict], folder: Path) -> dict:
 def table(report: dict) -> str:
     """The block of docs/times.md."""
     done = {name: report["steps"][name] for name in report["order"]}
-    share = max((one.get("others_share", 0) for one in done.values()), default=0)
+    share = max((result.get("others_share", 0) for result in done.values()), default=0)
     rows = [
         "| what | time | CPU time | memory, at most | on the disk afterwards |",
         "|---|---:|---:|---:|---|",
     ]
-    rows += [_row(one) for one in done.values()]
+    rows += [_row(result) for result in done.values()]
     ran = done.get("run", {}).get("stages", {})
     took = {name: ran[name] for name in sorted(ran, key=[*STAGES, *ran].index)}
     lines = [
@@ -198,21 +204,21 @@ def table(report: dict) -> str:
             "",
             f"| stage | {' | '.join(f'`{name}`' for name in took)} |",
             f"|---|{'---:|' * len(took)}",
-            f"| s | {' | '.join(format(one['median_s'], '.0f') for one in took.values())} |",
-            f"| how many | {' | '.join(str(one['count']) for one in took.values())} |",
+            f"| s | {' | '.join(format(stage['median_s'], '.0f') for stage in took.values())} |",
+            f"| how many | {' | '.join(str(stage['count']) for stage in took.values())} |",
         ]
     return "\n".join([*lines, END])
 
 
-def _row(one: dict) -> str:
-    if not one["ok"]:
-        return f"| {one['what']} | {one.get('skipped') or 'failed: ' + one['why']} | | | |"
-    parts = [f"`{name}` {_size(size)}" for name, size in sorted(one["disk_bytes"].items())]
+def _row(result: dict) -> str:
+    if not result["ok"]:
+        return f"| {result['what']} | {result.get('skipped') or 'failed: ' + result['why']} | | | |"
+    parts = [f"`{name}` {_size(size)}" for name, size in sorted(result["disk_bytes"].items())]
     cells = [
-        one["what"],
-        _duration(one["seconds"]),
-        _duration(one["cpu_seconds"]),
-        _size(one["peak_memory_bytes"]),
+        result["what"],
+        _duration(result["seconds"]),
+        _duration(result["cpu_seconds"]),
+        _size(result["peak_memory_bytes"]),
         ", ".join(parts),
     ]
     return f"| {' | '.join(cells)} |"
@@ -242,8 +248,8 @@ def times(
             done[step.name] = perform(step, done, folder)
             done[step.name].pop("status", None)
         done[step.name] |= {"what": step.what}
-        one = done[step.name]
-        summary = one.get("why") or one.get("skipped") or f"{one['seconds']:.0f} s"
+        result = done[step.name]
+        summary = result.get("why") or result.get("skipped") or f"{result['seconds']:.0f} s"
         print(f"{step.name}: {summary}", file=sys.stderr, flush=True)
     scripts = [clone / "app/cli.py", *sorted((clone / "stages").glob("[a-z]*.py"))]
     report = environment("cpu", command) | {
@@ -256,7 +262,7 @@ def times(
         "code": digests(*(script for script in scripts if script.is_file()), root=clone),
         "steps": done,
         "order": [step.name for step in todo],
-        "met": all(one["ok"] or "skipped" in one for one in done.values()),
+        "met": all(outcome["ok"] or "skipped" in outcome for outcome in done.values()),
     }
     write_json(root / REPORT, report)
     fits = seconds_of_fit(folder / "demo") | seconds_of_fit(clone)  # a recording's, and a demo's

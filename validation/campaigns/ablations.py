@@ -100,14 +100,16 @@ def aimed_and_launched(job: Job, params: Params, folder: Path) -> dict:
     """What one identification found of the episode in `folder`, and where its launches land."""
     pads = job.method != "nominal_pads"
     with priors_of(job.method):
-        one = identified(params, job.band, job.method, job.seed, folder, recorded_pads=pads)
-    draws = aimed(one.outcome, params, params.trials.targets)
+        identification = identified(
+            params, job.band, job.method, job.seed, folder, recorded_pads=pads
+        )
+    draws = aimed(identification.outcome, params, params.trials.targets)
     return {
-        "theta": one.theta,
-        "loss": one.confidence.get("loss"),
+        "theta": identification.theta,
+        "loss": identification.confidence.get("loss"),
         "draws_m": draws,
         "error_m": errors_on_the_rig(job.band, params, draws),
-        "seconds": one.seconds,
+        "seconds": identification.seconds,
     }
 
 
@@ -125,16 +127,16 @@ def lines_in(work: Path) -> ResultLines:
 def scores(results: list[dict], name: str) -> np.ndarray:
     """One number a result: the mean miss [cm] over targets that were reached, loss, or E [Pa]."""
     values = {
-        "miss_cm": lambda one: 100 * np.nanmean(np.abs(np.array(one["error_m"], float))),
-        "loss": lambda one: (one["loss"] or {}).get("total", np.nan),
-        "youngs_modulus": lambda one: one["theta"]["youngs_modulus"],
+        "miss_cm": lambda result: 100 * np.nanmean(np.abs(np.array(result["error_m"], float))),
+        "loss": lambda result: (result["loss"] or {}).get("total", np.nan),
+        "youngs_modulus": lambda result: result["theta"]["youngs_modulus"],
     }[name]
     return np.array([np.nan if lost(result) else values(result) for result in results])
 
 
-def lost(one: dict) -> bool:
+def lost(result: dict) -> bool:
     """Whether no launch of a result landed."""
-    return "failed" in one or not np.isfinite(np.array(one["error_m"], float)).any()
+    return "failed" in result or not np.isfinite(np.array(result["error_m"], float)).any()
 
 
 def summary(results: list[dict], bands: Sequence[str], methods: Sequence[str]) -> dict:
@@ -152,23 +154,27 @@ def summary(results: list[dict], bands: Sequence[str], methods: Sequence[str]) -
     for band in [*bands, "all"]:
         of = bands if band == "all" else [band]
         rows = {m: [r for b in of for r in picked(b, m, single)] for m in methods}
-        miss = {method: scores(own, "miss_cm") for method, own in rows.items()}
+        miss = {
+            method: scores(method_results, "miss_cm") for method, method_results in rows.items()
+        }
         figures[band] = {"methods": {}, f"less_{PAPER}": compared(miss, PAPER)}
-        for method, own in rows.items():
-            run = [one for one in own if one.get("failed") != "not run"]
-            signed = [np.nan if lost(one) else mean_of(one["error_m"]) for one in own]
+        for method, method_results in rows.items():
+            run = [result for result in method_results if result.get("failed") != "not run"]
+            signed = [
+                np.nan if lost(result) else mean_of(result["error_m"]) for result in method_results
+            ]
             figures[band]["methods"][method] = {
                 "miss_cm": mean_interval(miss[method]),
                 "bias_cm": mean_interval(100 * np.array(signed, float)),
-                "youngs_modulus": mean_interval(scores(own, "youngs_modulus")),
-                "loss": mean_interval(scores(own, "loss")),
+                "youngs_modulus": mean_interval(scores(method_results, "youngs_modulus")),
+                "loss": mean_interval(scores(method_results, "loss")),
                 "run": len(run),
                 "without_landing": sum(map(lost, run)),
                 "targets_out_of_reach": sum(
-                    value is None for one in run for value in one.get("error_m", [])
+                    value is None for result in run for value in result.get("error_m", [])
                 ),
                 "miss_cm_each": miss[method],
-                "seconds": mean_of([one.get("seconds") for one in run]),
+                "seconds": mean_of([result.get("seconds") for result in run]),
             }
             if band != "all":
                 seeds = scores(picked(band, method, spread), "miss_cm")
@@ -181,11 +187,11 @@ def rank_correlations(results: list[dict], methods: Sequence[str]) -> np.ndarray
 
     Positive: the lower the loss that a search reached, the nearer its launches land.
     """
-    found = {}
+    groups = {}
     for result in results:
         if result["method"] in methods and result["seed"] == 1 and not lost(result):
-            found.setdefault((result["band"], result["recording"]), []).append(result)
-    several = [some for some in found.values() if len(some) > 2]
+            groups.setdefault((result["band"], result["recording"]), []).append(result)
+    several = [some for some in groups.values() if len(some) > 2]
     pairs = [(scores(some, "loss"), scores(some, "miss_cm")) for some in several]
     return np.array([spearmanr(*pair).statistic for pair in pairs])
 
@@ -205,7 +211,7 @@ def mean_of(values) -> float:
 def report(args: argparse.Namespace, params: Params) -> None:
     """Write what the results in the work folder say."""
     wanted = set(jobs_of(args.bands, args.methods, args.recordings, args.seeds, args.first))
-    results = [one for job, one in lines_in(args.work).of(Job).items() if job in wanted]
+    results = [result for job, result in lines_in(args.work).of(Job).items() if job in wanted]
     if not results:
         raise UserError(f"{args.work}: holds no result of these bands and methods")
     same = [

@@ -122,7 +122,7 @@ class VariantJob(BandRecording):
 
 
 def recordings(orange: Path | None, pulls=("informative", "paper")) -> list[BandRecording]:
-    found = [
+    rig_recordings = [
         BandRecording(group, band, pull, number)
         for group, most in RECORDINGS.items()
         for number in range(most)
@@ -130,7 +130,9 @@ def recordings(orange: Path | None, pulls=("informative", "paper")) -> list[Band
         for band in SETS[group][1]
     ]
     count = len(OF_ORANGE) if orange else 0
-    return [BandRecording("orange", ORANGE, "paper", number) for number in range(count)] + found
+    return [
+        BandRecording("orange", ORANGE, "paper", number) for number in range(count)
+    ] + rig_recordings
 
 
 def with_change(params: Params, method: str) -> tuple[Params, str]:
@@ -225,21 +227,25 @@ def figures(lines: list[dict]) -> dict:
     for group, pull in COLUMNS:
         some = [line for line in lines if (line["group"], line["pull"]) == (group, pull)]
         for method in METHODS:
-            own = [one for one in some if one["method"] == method and "failed" not in one]
-            if not own:
+            successes = [line for line in some if line["method"] == method and "failed" not in line]
+            if not successes:
                 continue
             unit = "number" if group == "orange" else "band"
-            names = dict.fromkeys(one[unit] for one in own)
+            names = dict.fromkeys(line[unit] for line in successes)
             of_units = {
-                str(name): summary([one["scores"] for one in own if one[unit] == name])
+                str(name): summary([line["scores"] for line in successes if line[unit] == name])
                 for name in names
             }
             result.setdefault(f"{group}, {pull}", {})[method] = {
                 "together": together(of_units),
-                "recordings": len(own),
-                "failed": sum(one["method"] == method for one in some) - len(own),
-                "mean_bias": {name: about["mean_bias"] for name, about in of_units.items()},
-                "coverage": {name: about["coverage"] for name, about in of_units.items()},
+                "recordings": len(successes),
+                "failed": sum(line["method"] == method for line in some) - len(successes),
+                "mean_bias": {
+                    name: unit_summary["mean_bias"] for name, unit_summary in of_units.items()
+                },
+                "coverage": {
+                    name: unit_summary["coverage"] for name, unit_summary in of_units.items()
+                },
             }
     return plain(result, 4)
 
@@ -260,13 +266,13 @@ def _units(of_methods: dict) -> int:
     return len(of_methods[OURS]["mean_bias"])
 
 
-def _cell(about: dict | None) -> str:
-    if about is None:
+def _cell(method_figures: dict | None) -> str:
+    if method_figures is None:
         return "–"
-    one = about["together"]
-    text = f"{100 * one['mean_size_of_bias']:.1f} %"
-    if one["coverage"] is not None:
-        inside, width = (100 * one[name] for name in ("coverage", "median_width"))
+    means = method_figures["together"]
+    text = f"{100 * means['mean_size_of_bias']:.1f} %"
+    if means["coverage"] is not None:
+        inside, width = (100 * means[name] for name in ("coverage", "median_width"))
         text += f"; {inside:.0f} % in {width:.0f} %"
     return text
 
@@ -282,7 +288,9 @@ def main() -> int:
         return 0
     work, orange = arguments.work.resolve(), arguments.orange and arguments.orange.resolve()
     results, every = ResultLines(work / "results.jsonl"), recordings(orange)
-    todo = [VariantJob(**asdict(one), method=method) for one in every for method in METHODS]
+    todo = [
+        VariantJob(**asdict(recording), method=method) for recording in every for method in METHODS
+    ]
     limits = arguments.workers, arguments.minutes
     for _ in runner.each(partial(BandRecording.episode, work=work, orange=orange), every, *limits):
         pass

@@ -66,24 +66,24 @@ def measured(job: Recorded, work: Path) -> dict:
         write_json(truth, {"slip": record(params, job.band, path).slip_time})
     slip = json.loads(truth.read_text(encoding="utf-8"))["slip"]
     pull = Pull.of(read_recording(path, params.setup, params.episode.delays), params.setup)
-    found = correct_delays(pull.shifted(camera=-job.late), params)[1]
+    delays = correct_delays(pull.shifted(camera=-job.late), params)[1]
     latency = drawn(params, job.band).rig.pose_latency
-    late = found.camera.value - job.late
+    late = delays.camera.value - job.late
     return {
         "late": job.late,
-        "found": vars(found.camera),
+        "found": vars(delays.camera),
         "off": {
-            "pose": late - found.pose.rest + latency,
+            "pose": late - delays.pose.rest + latency,
             "release": late + pull.release.time - slip,
             "force": late,
         },
-        "stated": stated(found, pull.release.error),
+        "stated": stated(delays, pull.release.error),
     }
 
 
-def stated(found: Delays, release: float) -> dict[str, float]:
+def stated(delays: Delays, release: float) -> dict[str, float]:
     """Standard deviations [s]; `release` is that of the release on the force's clock."""
-    camera, pose = found.camera.left or np.nan, found.pose.left or np.nan
+    camera, pose = delays.camera.left or np.nan, delays.pose.left or np.nan
     tied = float(np.hypot(camera, pose))
     return {"pose": camera, "release": tied, "force": float(np.hypot(tied, release))}
 
@@ -97,7 +97,7 @@ def figures(lines: list[dict]) -> dict:
     good, result = [line for line in lines if "failed" not in line], {}
     for name in ("pose", "release", "force"):
         off, stated_errors = (
-            np.array([one[part][name] for one in good]) for part in ("off", "stated")
+            np.array([line[part][name] for line in good]) for part in ("off", "stated")
         )
         rms, stated_rms = np.sqrt(np.mean(off**2)), np.sqrt(np.mean(stated_errors**2))
         result[name] = {
@@ -128,8 +128,8 @@ def main() -> None:
         "recordings": plain(lines, 5),
     }
     write_json(args.report, report)
-    for name, about in report["figures"].items():
-        print(name, about)
+    for name, summary in report["figures"].items():
+        print(name, summary)
 
 
 if __name__ == "__main__":

@@ -246,9 +246,9 @@ def run(cell: Cell, work: Path) -> Result:
         (folder / "copy/data/floor/band1.json").unlink()
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
-    own = ProjectCopy(folder / "copy", TMPDIR=str(folder / "tmp")).environment
-    own.pop("PYTHONPATH")
-    at, log = Place(folder, folder / "copy", own, port), work / f"{folder.name}.txt"
+    variables = ProjectCopy(folder / "copy", TMPDIR=str(folder / "tmp")).environment
+    variables.pop("PYTHONPATH")
+    at, log = Place(folder, folder / "copy", variables, port), work / f"{folder.name}.txt"
     CONDITIONS[cell.condition](at)
     start = time.monotonic()
     with at.held, log.open("w") as message:
@@ -335,13 +335,13 @@ def main() -> int:
     conditions, left = [*CONDITIONS], [] if os.geteuid() == 0 else [*ROOTS]
     if left:
         print(f"left out, for only root can do so: {', '.join(left)}; no report is written")
-    conditions = [one for one in conditions if one not in left]
+    conditions = [name for name in conditions if name not in left]
     cells = [Cell(condition, command) for condition in conditions for command in COMMANDS]
     cells = [cell for cell in cells if cell not in NOT_OURS]
     cells = [cell for cell in cells if given.only in f"{cell.condition}: {cell.command}"]
     there = lines.of(Cell)
 
-    def one(cell: Cell) -> None:
+    def run_cell(cell: Cell) -> None:
         if cell not in there or there[cell]["faults"]:
             lines.add(result := run(cell, work))
             print(
@@ -349,14 +349,14 @@ def main() -> int:
             )
 
     with ThreadPoolExecutor(given.workers) as pool:
-        for _ in pool.map(one, cells):  # raises what a cell raises
+        for _ in pool.map(run_cell, cells):  # raises what a cell raises
             pass
-    found = [lines.of(Cell)[cell] for cell in cells]
+    results = [lines.of(Cell)[cell] for cell in cells]
     if not given.only and not left:
-        about = environment("cpu", "python -m validation.campaigns.conditions")
+        provenance = environment("cpu", "python -m validation.campaigns.conditions")
         code = digests(Path(__file__), ROOT / "app/cli.py")
-        write_json(given.report, about | {"code": code} | report(found))
-    return int(any(one["faults"] for one in found))
+        write_json(given.report, provenance | {"code": code} | report(results))
+    return int(any(result["faults"] for result in results))
 
 
 if __name__ == "__main__":

@@ -49,7 +49,7 @@ def record(request) -> Callable[..., None]:
         figures: dict,
         also: Iterable[Path] = (),
     ) -> None:
-        about = environment("cpu", "make validate", request.path, *also) | {
+        provenance = environment("cpu", "make validate", request.path, *also) | {
             "alone": "python -m pytest -m validation -n 0"
             f" validation/campaigns/{request.path.name}",
         }
@@ -58,7 +58,7 @@ def record(request) -> Callable[..., None]:
             "met": met,
             "settings": settings,
             "figures": figures,
-            **about,
+            **provenance,
         }
         write_json(ROOT / "reports/validation" / f"{name}.json", plain(content, digits=5))
 

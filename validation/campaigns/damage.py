@@ -32,17 +32,17 @@ def mutated(content: bytes, name: str, seed: int) -> bytes:
 
 def records(content: bytes) -> list[tuple[int, int, int]]:
     """(opcode, start, end) of each record of an undamaged file, heads included."""
-    at, found = 8, []
+    at, spans = 8, []
     while at < len(content) - 8:
         opcode, length = HEAD.unpack_from(content, at)
-        found.append((opcode, at, at + HEAD.size + length))
-        at = found[-1][2]
-    return found
+        spans.append((opcode, at, at + HEAD.size + length))
+        at = spans[-1][2]
+    return spans
 
 
 def _record(content: bytes, random: np.random.Generator, least: int = 1, most: int = 255):
-    found = [record for record in records(content) if least <= record[0] <= most]
-    return found[random.integers(len(found))][1:]
+    spans = [record for record in records(content) if least <= record[0] <= most]
+    return spans[random.integers(len(spans))][1:]
 
 
 def _place(content: bytes, random: np.random.Generator) -> int:
@@ -99,9 +99,9 @@ def _truncate(content: bytes, random: np.random.Generator) -> bytes:
 
 
 def _swap_records(content: bytes, random: np.random.Generator) -> bytes:
-    found = [record for record in records(content) if record[0] in (CHUNK, MESSAGE)]
-    i, j = sorted(random.choice(len(found), 2, replace=False))
-    (_, a, b), (_, c, d) = found[i], found[j]
+    spans = [record for record in records(content) if record[0] in (CHUNK, MESSAGE)]
+    i, j = sorted(random.choice(len(spans), 2, replace=False))
+    (_, a, b), (_, c, d) = spans[i], spans[j]
     return content[:a] + content[c:d] + content[b:c] + content[a:b] + content[d:]
 
 

@@ -42,7 +42,9 @@ def params_of(band: str, switch: str) -> Params:
     params = orange.with_orange(params) if band == orange.NAME else params
     section, values = SWITCHES[switch]
     if section == "method_defaults":
-        methods = {name: one.model_copy(update=values) for name, one in params.methods.items()}
+        methods = {
+            name: method.model_copy(update=values) for name, method in params.methods.items()
+        }
         return params.model_copy(update={"methods": methods})
     return params.model_copy(update={section: getattr(params, section).model_copy(update=values)})
 

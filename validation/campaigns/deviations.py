@@ -103,7 +103,9 @@ def prepare(where: tuple[str, int], work: Path, recordings: Path | None) -> None
     for switch, folder in folders.items():
         params = params_of(band, switch)
         how = params.cloud, params.force
-        episode = next((one for known, one in built if known == how), None)
+        episode = next(
+            (built_episode for settings, built_episode in built if settings == how), None
+        )
         if episode is None:
             episode = build_episodes(raw, band, params)[0][0]
             built.append((how, episode))
@@ -119,13 +121,19 @@ def prepare(where: tuple[str, int], work: Path, recordings: Path | None) -> None
 def scored(case: Case, work: Path, recordings: Path | None) -> dict:
     """What one identification found, and how near its forces and launches are."""
     params = params_of(case.band, case.switch)
-    one = identified(params, case.band, case.method, case.seed, case.episode(work))
-    about = {"theta": one.theta, "youngs_modulus": one.theta["youngs_modulus"]}
-    about |= {"seconds": one.seconds, "point": [*one.outcome.identified.values()]}
-    about |= {"own_loss": one.summary.get("loss", {}).get("total")}
+    identification = identified(params, case.band, case.method, case.seed, case.episode(work))
+    scores = {
+        "theta": identification.theta,
+        "youngs_modulus": identification.theta["youngs_modulus"],
+    }
+    scores |= {
+        "seconds": identification.seconds,
+        "point": [*identification.outcome.identified.values()],
+    }
+    scores |= {"own_loss": identification.summary.get("loss", {}).get("total")}
     seen = Episode.load(case.episode(work, AS_IS) / "episode")
-    about |= forces(case.band, one.outcome, seen)
-    return about | misses(case.band, one.outcome, seen, recordings)
+    scores |= forces(case.band, identification.outcome, seen)
+    return scores | misses(case.band, identification.outcome, seen, recordings)
 
 
 def work_on(case: Case, work: Path, recordings: Path | None) -> dict:
@@ -140,10 +148,10 @@ def lines_in(work: Path) -> ResultLines:
 def run(args: argparse.Namespace, cases: list[Case]) -> None:
     """Episodes, then identifications, one a process."""
     recordings = [*dict.fromkeys((case.band, case.recording) for case in cases)]
-    about = {"work": args.work, "recordings": args.orange}
-    for _ in runner.each(partial(prepare, **about), recordings, args.workers):
+    folders = {"work": args.work, "recordings": args.orange}
+    for _ in runner.each(partial(prepare, **folders), recordings, args.workers):
         pass
-    runner.run(partial(work_on, **about), cases, lines_in(args.work), args.workers)
+    runner.run(partial(work_on, **folders), cases, lines_in(args.work), args.workers)
 
 
 def report(args: argparse.Namespace, cases: list[Case]) -> None:
@@ -193,7 +201,9 @@ def block(content: dict) -> str:
     refusals = content["settings"]["clamps_refused"]
     for setting in dict.fromkeys(refusal.split(", ")[1] for refusal in refusals):
         bands = ", ".join(
-            band for band, own in (refusal.split(", ") for refusal in refusals) if own == setting
+            band
+            for band, refused_setting in (refusal.split(", ") for refusal in refusals)
+            if refused_setting == setting
         )
         summary.append(
             f"With `{setting}` no clamps can be calibrated ({bands}): the default's serve."

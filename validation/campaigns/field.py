@@ -94,7 +94,9 @@ def checked(path: Path, recording: str) -> tuple[list[dict], s2s.Episode | None]
 
     params, band = params_of(recording)
     concern = {
-        check.name: one.__name__.rpartition(".")[2] for one in CONCERNS for check in one.CHECKS
+        check.name: module.__name__.rpartition(".")[2]
+        for module in CONCERNS
+        for check in module.CHECKS
     }
     try:
         pull = Pull.of(read_recording(path, params.setup), params.setup)
@@ -102,7 +104,7 @@ def checked(path: Path, recording: str) -> tuple[list[dict], s2s.Episode | None]
     except UserError as error:
         text = str(error).removeprefix(f"{path}: ")
         return [{"about": "", "concern": "", "what": text, "refused": True}], None
-    found = [
+    findings = [
         {
             "about": finding.about,
             "concern": concern[finding.about],
@@ -111,24 +113,24 @@ def checked(path: Path, recording: str) -> tuple[list[dict], s2s.Episode | None]
         }
         for finding in done.findings
     ]
-    return found, episode_of(done, band, params)
+    return findings, episode_of(done, band, params)
 
 
 def identified(episode: s2s.Episode, recording: str, start: s2s.Model | None) -> s2s.Identification:
     params, name = params_of(recording)
-    about = params.bands[name]
-    band = s2s.Band(about.mass, about.diameter, about.rest_length, name)
+    band_params = params.bands[name]
+    band = s2s.Band(band_params.mass, band_params.diameter, band_params.rest_length, name)
     settings = s2s.Settings.default(setup=params.setup.model_dump())
     return s2s.identify([episode], band, settings=settings, start=start)
 
 
-def summary(found: s2s.Identification) -> dict:
+def summary(identification: s2s.Identification) -> dict:
     """E [Pa] and s·d [s] with their intervals, and whether the fit converged."""
     names = {"modulus": "youngs_modulus", "damping": "damping_product"}
-    values = {key: found.intervals[name] for key, name in names.items()}
-    return {key: [one.value, one.low, one.high] for key, one in values.items()} | {
-        "settled": found.settled
-    }
+    values = {key: identification.intervals[name] for key, name in names.items()}
+    return {
+        key: [interval.value, interval.low, interval.high] for key, interval in values.items()
+    } | {"settled": identification.settled}
 
 
 def start_of(recording: str, episode: s2s.Episode | None, work: Path, folder: Path | None):
@@ -147,10 +149,10 @@ def tried(case: Faulty, work: Path, folder: Path | None) -> dict:
     """What came of one recording."""
     whole = recorded(case.recording, work, folder)
     if case.fault == SOUND:
-        found, episode = checked(whole, case.recording)
+        findings, episode = checked(whole, case.recording)
         if case.recording in FAULTY:
             start_of(case.recording, episode, work, folder)
-        return {"findings": found}
+        return {"findings": findings}
     from validation.recordings.streams import Bag
 
     fault = FAULTS[case.fault]
@@ -160,19 +162,19 @@ def tried(case: Faulty, work: Path, folder: Path | None) -> dict:
         fault.make(bag, case.size)
         bag.write(path)
         del bag
-        found, episode = checked(path, case.recording)
+        findings, episode = checked(path, case.recording)
     if episode is None:
-        return {"findings": found, "outcome": REFUSED}
-    if any(one["concern"] in fault.concerns for one in found):
-        return {"findings": found, "outcome": CAUTIONED}
+        return {"findings": findings, "outcome": REFUSED}
+    if any(finding["concern"] in fault.concerns for finding in findings):
+        return {"findings": findings, "outcome": CAUTIONED}
     sound = start_of(case.recording, None, work, folder)
     try:
         values = summary(identified(episode, case.recording, sound))
     except UserError as error:
-        return {"findings": found, "outcome": REFUSED, "identification": str(error)}
+        return {"findings": findings, "outcome": REFUSED, "identification": str(error)}
     right = is_right(summary(sound), values)
-    outcome = CORRECT if right else MISNAMED if found else SILENT
-    return {"findings": found, "outcome": outcome, "values": values} | errors_of(sound, values)
+    outcome = CORRECT if right else MISNAMED if findings else SILENT
+    return {"findings": findings, "outcome": outcome, "values": values} | errors_of(sound, values)
 
 
 def is_right(sound: dict, values: dict) -> bool:
@@ -213,9 +215,11 @@ def report(args: argparse.Namespace, cases: list[Faulty]) -> None:
     if not results:
         raise UserError(f"{args.work}: holds no result")
     alarms = [
-        {"recording": one["recording"], **finding} for one in sound for finding in one["findings"]
+        {"recording": result["recording"], **finding}
+        for result in sound
+        for finding in result["findings"]
     ]
-    families = dict.fromkeys(one.family for one in FAULTS.values())
+    families = dict.fromkeys(fault.family for fault in FAULTS.values())
     content = {
         "kind": "virtual",
         "asked": "What becomes of the faults that labs report: corrected, reported, or not.",
@@ -243,11 +247,13 @@ def _counts(results: list[dict]) -> dict[str, int]:
 
 def _family(results: list[dict], family: str) -> dict:
     """Counts of a class, and the largest errors that nothing of its concern reported."""
-    own = [result for result in results if FAULTS[str(result["fault"])].family == family]
-    passed = [one for one in own if "modulus_error" in one]
-    factors = [max(one["damping_factor"], 1 / one["damping_factor"]) for one in passed]
-    return _counts(own) | {
-        "largest_modulus_error": max((abs(one["modulus_error"]) for one in passed), default=None),
+    family_results = [result for result in results if FAULTS[str(result["fault"])].family == family]
+    passed = [result for result in family_results if "modulus_error" in result]
+    factors = [max(result["damping_factor"], 1 / result["damping_factor"]) for result in passed]
+    return _counts(family_results) | {
+        "largest_modulus_error": max(
+            (abs(result["modulus_error"]) for result in passed), default=None
+        ),
         "largest_damping_factor": max(factors, default=None),
     }
 
@@ -260,11 +266,11 @@ def block(content: dict) -> str:
         " largest undetected error of E, s·d |",
         "|---|---|---|---|---|---|---|",
     ]
-    for name, one in content["families"].items():
-        tried = sum(one.get(outcome, 0) for outcome in (*OUTCOMES, "failed"))
-        counts = one.get(CORRECT, 0), one.get(CAUTIONED, 0) + one.get(REFUSED, 0)
-        counts += one.get(MISNAMED, 0), one.get(SILENT, 0)
-        error, factor = one["largest_modulus_error"], one["largest_damping_factor"]
+    for name, figures in content["families"].items():
+        tried = sum(figures.get(outcome, 0) for outcome in (*OUTCOMES, "failed"))
+        counts = figures.get(CORRECT, 0), figures.get(CAUTIONED, 0) + figures.get(REFUSED, 0)
+        counts += figures.get(MISNAMED, 0), figures.get(SILENT, 0)
+        error, factor = figures["largest_modulus_error"], figures["largest_damping_factor"]
         largest = "–" if error is None else f"{100 * error:.1f} %, {factor:.2g} times"
         if tried:
             rows.append(f"| {name} | {tried} | {' | '.join(map(str, counts))} | {largest} |")
@@ -284,7 +290,7 @@ def main() -> None:
         content = json.loads(made(args.report).read_text(encoding="utf-8"))
         write_text(PAGE, with_block(PAGE.read_text(encoding="utf-8"), block(content)))
         return
-    faulty = [one for one in FAULTY if args.orange or one not in ORANGE]
+    faulty = [name for name in FAULTY if args.orange or name not in ORANGE]
     sound = [*(ORANGE if args.orange else ()), *RIG, *(f"{name}_0" for name in RUBBERS)]
     cases = cases_of(faulty, sound, args.faults)
     if not args.report_only:

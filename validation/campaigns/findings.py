@@ -36,13 +36,15 @@ def block(content: dict) -> str:
         " farther off on |",
         "|---|---:|---:|---:|---:|---:|---:|",
     ]
-    for name in sorted(methods, key=lambda one: (one in NAMES, methods[one]["miss_cm"]["mean"])):
-        one, less = methods[name], against.get(name)
-        miss, paper = one["miss_cm"], methods[PAPER]["miss_cm_each"]
+    for name in sorted(
+        methods, key=lambda method: (method in NAMES, methods[method]["miss_cm"]["mean"])
+    ):
+        row, less = methods[name], against.get(name)
+        miss, paper = row["miss_cm"], methods[PAPER]["miss_cm_each"]
         cells = [NAMES.get(name, named[name].name), f"{rollouts[name]:,}"]
-        cells += [f"{one['loss']['mean']:.3f}", interval(miss, "{:.1f}")]
+        cells += [f"{row['loss']['mean']:.3f}", interval(miss, "{:.1f}")]
         if less:
-            each = [m > p for m, p in zip(one["miss_cm_each"], paper, strict=True)]
+            each = [m > p for m, p in zip(row["miss_cm_each"], paper, strict=True)]
             p = less["p_holm"]
             cells += [interval(less, "{:+.1f}"), "< 0.001" if p < 1e-3 else f"{p:.2g}"]
             cells.append(f"{sum(each)} of {len(each)}")
@@ -52,9 +54,9 @@ def block(content: dict) -> str:
     return begin + "\n".join(rows).replace(" -", " −").replace("(-", "(−") + "\n" + end
 
 
-def interval(about: dict, form: str) -> str:
+def interval(estimate: dict, form: str) -> str:
     """A mean with its interval."""
-    mean, low, high = (form.format(about[name]) for name in ("mean", "low", "high"))
+    mean, low, high = (form.format(estimate[name]) for name in ("mean", "low", "high"))
     return f"{mean} ({low} to {high})"
 
 

@@ -171,18 +171,21 @@ def figures(lines: list[dict]) -> dict:
     kinds = {id(line): job_of(line).kind for line in lines}
     for kind in sorted(set(kinds.values())):
         some = [line for line in lines if kinds[id(line)] == kind]
-        good = [one for one in some if "failed" not in one]
+        good = [line for line in some if "failed" not in line]
         if not good:
             continue
-        names = list(dict.fromkeys(one["band"] for one in good))
+        names = list(dict.fromkeys(line["band"] for line in good))
         of_bands = {
-            name: summary([one["scores"] for one in good if one["band"] == name]) for name in names
+            name: summary([line["scores"] for line in good if line["band"] == name])
+            for name in names
         }
         result[kind] = {
             "together": together(of_bands),
-            "settled": [sum(bool(one["told"]["settled"]) for one in good), len(good)],
+            "settled": [sum(bool(line["told"]["settled"]) for line in good), len(good)],
             "refused": {
-                f"{one['band']} {one['number']}": one["failed"] for one in some if "failed" in one
+                f"{line['band']} {line['number']}": line["failed"]
+                for line in some
+                if "failed" in line
             },
             "bands": of_bands,
         }
@@ -242,16 +245,16 @@ def block(contents: dict[str, dict]) -> str:
         for kind, how in ROWS.items():
             if kind not in (of := contents[name]["figures"]):
                 continue
-            about, (settled, count) = of[kind]["together"], of[kind]["settled"]
-            size, worst = 100 * about["mean_size_of_bias"], 100 * about["worst_bias"]
+            means, (settled, count) = of[kind]["together"], of[kind]["settled"]
+            size, worst = 100 * means["mean_size_of_bias"], 100 * means["worst_bias"]
             cells = [words, how, str(count), f"{size:.1f} % ({worst:+.1f} %)"]
-            if about["coverage"] is None:
+            if means["coverage"] is None:
                 cells += ["–", "–", "–"]
             else:
-                low, high = (100 * value for value in about["coverage_by_bands"])
-                shares = percent(100 * about["coverage"]), percent(100 * about["least_coverage"])
+                low, high = (100 * value for value in means["coverage_by_bands"])
+                shares = percent(100 * means["coverage"]), percent(100 * means["least_coverage"])
                 cells.append(f"{shares[0]} ({low:.0f} to {high:.0f} %; {shares[1]})")
-                width = 100 * about["median_width"]
+                width = 100 * means["median_width"]
                 cells += [f"{width:.1f} %", f"{settled} of {count}"]
             rows.append("| " + " | ".join(cells).replace("-", "−") + " |")
     return begin + "\n".join(rows) + "\n" + end
@@ -260,9 +263,9 @@ def block(contents: dict[str, dict]) -> str:
 def sentence(content: dict) -> str:
     """What the README has between its marks, of the report of the sealed rubbers."""
     begin, end = marks(BLOCK)
-    about, bands = (content["figures"]["informative, virgin"][key] for key in ("together", "bands"))
+    means, bands = (content["figures"]["informative, virgin"][key] for key in ("together", "bands"))
     size, worst, inside, width = (
-        100 * about[key] for key in ("mean_size_of_bias", "worst_bias", "coverage", "median_width")
+        100 * means[key] for key in ("mean_size_of_bias", "worst_bias", "coverage", "median_width")
     )
     ours, theirs = (
         100 * content["figures"][kind]["together"]["mean_size_of_bias"]
@@ -316,8 +319,8 @@ def main() -> int:
         "recordings": plain([brief(line) for line in lines], 4),
     }
     write_json(report_of(arguments.set), report)
-    for name, about in report["figures"].items():
-        print(name, {key: value for key, value in about["together"].items()}, about["settled"])
+    for name, row in report["figures"].items():
+        print(name, {key: value for key, value in row["together"].items()}, row["settled"])
     return 0
 
 

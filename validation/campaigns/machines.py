@@ -78,9 +78,9 @@ def inputs(params: Params, band: str, root: Path) -> str:
     layout = Layout(root)
     names = ("signals", "clouds")
     files = [layout.episode(band) / f"{name}.parquet" for name in names]
-    about = (params.bands[band], params.setup, params.sling, params.force, params.loss)
-    about += (params.parameters, params.optimizer, params.methods[OURS], params.methods[PAPER])
-    texts = [one.model_dump_json() for one in about]
+    settings = (params.bands[band], params.setup, params.sling, params.force, params.loss)
+    settings += (params.parameters, params.optimizer, params.methods[OURS], params.methods[PAPER])
+    texts = [section.model_dump_json() for section in settings]
     return fingerprint(*map(made, [*files, layout.clamps(band)]), *texts)
 
 
@@ -99,7 +99,9 @@ def identified(band: str, method: str, root: Path, device: str) -> dict:
     return {
         "theta": outcome.identified,
         "loss": total if np.isfinite(total) else None,
-        "landing": [one if np.isfinite(one) else None for one in landed.landing_y.tolist()],
+        "landing": [
+            landing if np.isfinite(landing) else None for landing in landed.landing_y.tolist()
+        ],
         "failure": landed.failure,
         "seconds": seconds,
     }
@@ -143,16 +145,18 @@ def compared(reports: dict[str, MachineReport]) -> tuple[list[str], bool]:
         if _comparable(reports[first], what) != _comparable(reports[other], what):
             raise UserError(f"{first} and {other}: of different {what}, which nobody can compare")
     lines = ["| machine | processor | device |", "|---|---|---|"]
-    lines += [f"| {n} | {one.processor} | {one.device_name} |" for n, one in reports.items()]
+    lines += [
+        f"| {n} | {report.processor} | {report.device_name} |" for n, report in reports.items()
+    ]
     lines += ["", "| band | method | machine | E [kPa] | loss | landings, off the first | time |"]
     lines += ["|---|---|---|---:|---:|---:|---:|"]
     bands, largest = reports[first].bands, dict.fromkeys((OURS, PAPER), 0.0)
     for band, method, name in product(bands, largest, reports):
-        one, reference = (reports[n].bands[band][method] for n in (name, first))
+        result, reference = (reports[n].bands[band][method] for n in (name, first))
         lines.append(
-            f"| {band} | {method} | {name} | {one.theta['youngs_modulus'] / 1e3:.3f} |"
-            f" {one.loss or np.nan:.6f} | {100 * apart([reference, one]):.2g} % |"
-            f" {one.seconds:.0f} s |"
+            f"| {band} | {method} | {name} | {result.theta['youngs_modulus'] / 1e3:.3f} |"
+            f" {result.loss or np.nan:.6f} | {100 * apart([reference, result]):.2g} % |"
+            f" {result.seconds:.0f} s |"
         )
     for band, method in product(bands, largest):
         summary = [report.bands[band][method] for report in reports.values()]
@@ -166,7 +170,7 @@ def compared(reports: dict[str, MachineReport]) -> tuple[list[str], bool]:
 
 def apart(summary: list[MachineLandings]) -> float:
     """The largest relative difference of a landing; infinite where only some machines have it."""
-    landings = np.array([one.landing for one in summary], float)  # None is NaN
+    landings = np.array([machine.landing for machine in summary], float)  # None is NaN
     lacks = np.isnan(landings)
     if (lacks.any(axis=0) != lacks.all(axis=0)).any():
         return np.inf

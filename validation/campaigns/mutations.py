@@ -52,16 +52,16 @@ def shares(count: int, done: set[tuple]) -> list[tuple[str, str, int, int]]:
     that is stopped has some of each.
     """
     cells = [(family, container) for family in FAMILIES for container in CONTAINERS]
-    found = []
+    parts = []
     for place, cell in enumerate(cells):
         last = (count - place + len(cells) - 1) // len(cells)
         todo = [seed for seed in range(last) if (*cell, seed) not in done]
         while todo:
             end = next((n for n, seed in enumerate(todo) if seed != todo[0] + n), len(todo))
             end = min(end, SHARE)
-            found.append((*cell, todo[0], todo[0] + end))
+            parts.append((*cell, todo[0], todo[0] + end))
             todo = todo[end:]
-    return sorted(found, key=lambda one: one[2] // SHARE)
+    return sorted(parts, key=lambda part: part[2] // SHARE)
 
 
 def run(
@@ -126,8 +126,8 @@ def _results(folder: Path, family: str, container: str, first: int, end: int) ->
                 raise RuntimeError(f"{' '.join(map(str, command))}: {log.read_text()}")
             when = " before it began" if "outcome" in line else ""
             words = f"ended by {process.returncode}{when}{_place(log.read_text())}"
-            about = {"family": family, "container": container, "seed": first}
-            yield {**about, "outcome": FAULT, "words": words, "s": HANGS, "bytes": 0}
+            recording = {"family": family, "container": container, "seed": first}
+            yield {**recording, "outcome": FAULT, "words": words, "s": HANGS, "bytes": 0}
             first += 1
     log.unlink(missing_ok=True)
 
@@ -145,20 +145,20 @@ def faults(results: list[Result]) -> list[Result]:
 
 def counts(results: list[Result]) -> dict[str, dict[str, dict[str, int]]]:
     """How many there were of each outcome, by family and container."""
-    found = {family: {container: Counter() for container in CONTAINERS} for family in FAMILIES}
+    counters = {family: {container: Counter() for container in CONTAINERS} for family in FAMILIES}
     for result in results:
-        found[result["family"]][result["container"]][result["outcome"]] += 1
+        counters[result["family"]][result["container"]][result["outcome"]] += 1
     return {
         family: {name: dict(sorted(some.items())) for name, some in row.items()}
-        for family, row in found.items()
+        for family, row in counters.items()
     }
 
 
 def summary(results: list[Result], wanted: int) -> dict:
     """Of results in the order of their keys."""
     failed = faults(results)
-    slowest = max(results, key=lambda one: one["s"])
-    largest = max(results, key=lambda one: one["bytes"])
+    slowest = max(results, key=lambda result: result["s"])
+    largest = max(results, key=lambda result: result["bytes"])
     return {
         "asked": "Of every damaged recording comes the undamaged one's episode, or an episode and"
         " what was lost, or one clear line; no traceback, no hang,"
@@ -182,8 +182,8 @@ def summary(results: list[Result], wanted: int) -> dict:
     }
 
 
-def _named(one: Result) -> Result:
-    return {name: one[name] for name in ("family", "container", "seed")}
+def _named(result: Result) -> Result:
+    return {name: result[name] for name in ("family", "container", "seed")}
 
 
 def main() -> None:

@@ -83,7 +83,7 @@ def outcome(
             FAULT,
             f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})",
         )
-    words = [one for one in message(done) if one not in usual]
+    words = [text for text in message(done) if text not in usual]
     if words:
         return SAID, "; ".join(words)
     if same(episode, whole):
@@ -103,8 +103,8 @@ def main(folder: Path, family: str, container: str, seeds: range) -> None:
     faulthandler.register(signal.SIGPROF, chain=True)
     for seed in seeds:
         path.write_bytes(mutated(content, name, seed))
-        about = {"family": family, "container": container, "seed": seed}
-        print(json.dumps(about), flush=True)
+        recording = {"family": family, "container": container, "seed": seed}
+        print(json.dumps(recording), flush=True)
         signal.setitimer(signal.ITIMER_PROF, HANGS)
         faulthandler.dump_traceback_later(BLOCKS, exit=True)
         start = time.process_time()
@@ -115,7 +115,7 @@ def main(folder: Path, family: str, container: str, seeds: range) -> None:
         held = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         if held > MOST:
             came, words = FAULT, f"{held / 2**30:.1f} GiB of memory"
-        line = {**about, "outcome": came, "words": words[:WORDS], "s": seconds, "bytes": held}
+        line = {**recording, "outcome": came, "words": words[:WORDS], "s": seconds, "bytes": held}
         print(json.dumps(line), flush=True)
         if held > MOST:
             break  # what comes next is not to blame

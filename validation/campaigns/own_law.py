@@ -52,17 +52,18 @@ def figures(lines: list[dict]) -> dict:
     result = {}
     for pull in PULLS:
         some = [line for line in lines if line["pull"] == pull]
-        good = [one for one in some if "failed" not in one]
+        good = [line for line in some if "failed" not in line]
         if not good:
             continue
         parts = {
-            name: np.array([one["below"][name] for one in good], float) for name in good[0]["below"]
+            name: np.array([line["below"][name] for line in good], float)
+            for name in good[0]["below"]
         }
-        ranks = {name: summary(one[np.isfinite(one)]) for name, one in parts.items()}
+        ranks = {name: summary(part[np.isfinite(part)]) for name, part in parts.items()}
         result[pull] = {
             "episodes": len(good),
-            "refused": [one["failed"] for one in some if "failed" in one],
-            "settled": sum(one["settled"] for one in good),
+            "refused": [line["failed"] for line in some if "failed" in line],
+            "settled": sum(line["settled"] for line in good),
             "ranks": ranks,
             "met": all(HELD[0] <= rank["coverage"] <= HELD[1] for rank in ranks.values()),
         }
@@ -88,10 +89,10 @@ def main() -> None:
         "episodes": plain(lines, 4),
     }
     write_json(args.report, report)
-    for pull, about in report["figures"].items():
-        print(f"{pull}: {about['episodes']} episodes, {about['settled']} settled")
-        for name, one in about["ranks"].items():
-            print(f"  {name}: {one}")
+    for pull, pull_figures in report["figures"].items():
+        print(f"{pull}: {pull_figures['episodes']} episodes, {pull_figures['settled']} settled")
+        for name, rank in pull_figures["ranks"].items():
+            print(f"  {name}: {rank}")
 
 
 if __name__ == "__main__":

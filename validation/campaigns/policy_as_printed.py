@@ -98,16 +98,16 @@ def taught(lesson: Lesson, params: Params, theta: dict, progress: Progress | Non
 def result(lesson: Lesson, params: Params, work: Path, method: str) -> dict:
     """The one in `work`; trained where it is missing, or of another θ, settings or code."""
     theta = load_theta(Path("data/theta", lesson.band, f"{method}.json"), lesson.band)
-    about = theta, lesson.settings(params).model_dump(), params.setup.model_dump()
+    inputs = theta, lesson.settings(params).model_dump(), params.setup.model_dump()
     code = [digest(ROOT / part) for part in TRAINING]
-    stamp = fingerprint(json.dumps([about, params.trials.targets, code], sort_keys=True))
+    stamp = fingerprint(json.dumps([inputs, params.trials.targets, code], sort_keys=True))
     lines = ResultLines(work / "results.jsonl")
     retained = lines.of(Lesson).get(lesson, {})
     if retained.get("stamp") != stamp:
         name = f"{lesson.band}-{lesson.switch}-{lesson.seed}"
         progress = Progress(name, params.policy.iterations, "iterations", every=10)
-        found = taught(lesson, params, theta, progress)
-        retained = plain({"stamp": stamp, **vars(lesson), **found})
+        outcome = taught(lesson, params, theta, progress)
+        retained = plain({"stamp": stamp, **vars(lesson), **outcome})
         lines.add(retained)
     return {key: value for key, value in retained.items() if key != "stamp"}
 
@@ -115,26 +115,26 @@ def result(lesson: Lesson, params: Params, work: Path, method: str) -> dict:
 def summary(results: list[dict]) -> dict:
     """By band and switch: |y - g| in cm, means over seeds, each of the mean over the targets."""
     figures: dict[str, dict] = {}
-    for one in results:
-        figures.setdefault(one["band"], {}).setdefault(one["switch"], []).append(one)
+    for row in results:
+        figures.setdefault(row["band"], {}).setdefault(row["switch"], []).append(row)
     return {
-        band: {switch: _of_seeds(own) for switch, own in switches.items()}
+        band: {switch: _of_seeds(rows) for switch, rows in switches.items()}
         for band, switches in figures.items()
     }
 
 
-def _of_seeds(own: list[dict]) -> dict:
-    errors_cm = 100 * np.array([one["error_m"] for one in own], float)  # null becomes NaN
+def _of_seeds(rows: list[dict]) -> dict:
+    errors_cm = 100 * np.array([row["error_m"] for row in rows], float)  # null becomes NaN
     return {
         "miss_cm": mean_interval(errors_cm.mean(axis=1)),
         "miss_cm_each": plain(errors_cm),  # a row for each seed
         "range_miss_cm": mean_interval(
-            100 * np.array([one["range_mean_error_m"] for one in own], float)
+            100 * np.array([row["range_mean_error_m"] for row in rows], float)
         ),
-        "range_failures": sum(sum(one["range_failures"].values()) for one in own),
-        "last_miss_cm": mean_interval(100 * np.array([one["last_error_m"] for one in own], float)),
-        "std": [one["std"] for one in own],
-        "wall_s": mean_interval(np.array([one["wall_s"] for one in own])),
+        "range_failures": sum(sum(row["range_failures"].values()) for row in rows),
+        "last_miss_cm": mean_interval(100 * np.array([row["last_error_m"] for row in rows], float)),
+        "std": [row["std"] for row in rows],
+        "wall_s": mean_interval(np.array([row["wall_s"] for row in rows])),
     }
 
 

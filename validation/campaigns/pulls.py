@@ -148,7 +148,7 @@ def judged(params: Params, name: str, pulls: dict[str, Sequence[Dip]]) -> dict:
     rubber = replace(rubber, scale=hidden.peak_force / peak)
     worst = float(scalar.band.drawn(np.array(DRAW)))
     truth = [rubber.scale * true_energy(rubber, scalar, draw, worst) for draw in DRAWS]
-    every, found = round(scalar.period / STEP), {}
+    every, rows = round(scalar.period / STEP), {}
     for pull, dips in pulls.items():
         way = scalar.pull(dips)
         force = scalar.force(rubber.scale * true_stress(rubber, scalar.band.drawn(way)), way)
@@ -162,14 +162,14 @@ def judged(params: Params, name: str, pulls: dict[str, Sequence[Dip]]) -> dict:
             ]
             errors_of.append(100 * (np.array(energies) / truth - 1))
             rests.append(rest)
-        found[pull] = {
+        rows[pull] = {
             "error_percent": np.mean(errors_of, axis=0).round(2).tolist(),
             "mean_abs_error_percent": round(float(np.mean(np.abs(errors_of))), 2),
             "scatter_percent": round(float(np.std(errors_of, axis=0).mean()), 2),
             "left_newton": round(float(np.mean(rests)), 4),
             "softening": round(summary["softening"], 3),
         }
-    return found
+    return rows
 
 
 def main() -> None:
@@ -181,22 +181,25 @@ def main() -> None:
     limits = PullLimits(plan.max_speed, plan.max_acceleration, SPARE)
 
     def design_of(name: str, force: float) -> PullDesign:
-        about = (-DRAW, 0.0), (PULL_TIME, PAUSE), force, params.trials.targets
-        return PullDesign.of(params, METHOD, name, *about, cores())
+        inputs = (-DRAW, 0.0), (PULL_TIME, PAUSE), force, params.trials.targets
+        return PullDesign.of(params, METHOD, name, *inputs, cores())
 
     chosen = searched(design_of(USUAL, params.setup.max_force / 2), limits)
     pulls = {"paper": (), "one_dip": ONE_DIP, "searched": chosen, "by_hand": BY_HAND}
-    found = {}
+    rubber_rows = {}
     for name in rubbers(DEVELOP):
         design = design_of(name, params.rig.bands[name].peak_force)
-        found[name] = judged(params, name, pulls)
-        for pull, rows in found[name].items():
+        rubber_rows[name] = judged(params, name, pulls)
+        for pull, rows in rubber_rows[name].items():
             summary = 100 * 1.645 * np.sqrt(design.variances(pulls[pull]).mean())
             rows["expected_half_width_percent"] = round(float(summary), 2)
-        print(name, {pull: row["mean_abs_error_percent"] for pull, row in found[name].items()})
+        print(
+            name, {pull: row["mean_abs_error_percent"] for pull, row in rubber_rows[name].items()}
+        )
     mean = {
         pull: round(
-            float(np.mean([one[pull]["mean_abs_error_percent"] for one in found.values()])), 2
+            float(np.mean([rows[pull]["mean_abs_error_percent"] for rows in rubber_rows.values()])),
+            2,
         )
         for pull in pulls
     }
@@ -206,7 +209,7 @@ def main() -> None:
         "mean_abs_error_percent": mean,
         "searched_dips_are_better": mean["searched"] < 0.9 * mean["one_dip"],
         "dips": {name: [dip.model_dump() for dip in dips] for name, dips in pulls.items()},
-        "rubbers": found,
+        "rubbers": rubber_rows,
     }
     write_json(args.report, content | environment("cpu", "python -m validation.campaigns.pulls"))
     print(f"{mean}; wrote {args.report}")

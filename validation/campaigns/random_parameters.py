@@ -37,8 +37,8 @@ REPORT = "reports/validation/random-parameters-{}.json"
 def random_sets(bench: Bench, law: str, count: int) -> Parameters:
     """`count` random ones of the box."""
     boxes = np.array([BOX[name] for name in LAWS[law]]).reshape(-1, 2)
-    own = np.random.default_rng(SEED).uniform(*boxes.T, (count, len(boxes)))
-    others = dict(zip(LAWS[law], own.T, strict=True))
+    draws = np.random.default_rng(SEED).uniform(*boxes.T, (count, len(boxes)))
+    others = dict(zip(LAWS[law], draws.T, strict=True))
     return Parameters.of(law, random_thetas(bench, count, SEED), **others)
 
 
@@ -52,11 +52,11 @@ def surveyed(bench: Bench, law: str, count: int, progress=print) -> dict:
         "default_grip": lambda: survey(bench, sling, sets[half:], progress, BATCH),
         "launches": lambda: survey_launches(bench, sling, sets),
     }
-    found = {}
+    surveys = {}
     for name, task in tasks.items():
         content, _, wall = timed(task)
-        found[name] = content | {"seconds": wall}
-    return found
+        surveys[name] = content | {"seconds": wall}
+    return surveys
 
 
 def main() -> None:
@@ -66,7 +66,7 @@ def main() -> None:
     requested = parser.parse_args()
     bench = Bench(load(), device=requested.device, workers=cores())
     laws = {law: surveyed(bench, law, requested.count) for law in (NEO_HOOKEAN, RUBBER)}
-    unmarked = sum(one["not_finite"] for law in laws.values() for one in law.values())
+    unmarked = sum(counts["not_finite"] for law in laws.values() for counts in law.values())
     command = "python -m validation.campaigns.random_parameters"
     content = {
         "asked": "No rollout and no launch that is not finite and not marked as failed.",

@@ -73,11 +73,11 @@ def lsoda(tight: float) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
         )
         if solution.status < 0:
             raise RuntimeError(f"LSODA: {solution.message}")
-        found, states = solution.t, solution.y.T
+        instants, states = solution.t, solution.y.T
         if solution.status == 1:
-            found = np.append(found, solution.t_events[0])
+            instants = np.append(instants, solution.t_events[0])
             states = np.vstack([states, solution.y_events[0]])
-        return found, states
+        return instants, states
 
     return integrated
 
@@ -97,16 +97,16 @@ def banded(size: int, data: Any) -> dict[str, Any]:
     nodes = len(data[0].masses)
     width = size // nodes
     reach = (NEAR + 1) * width - 1
-    found = np.zeros((nodes, 2 * NEAR + 1, width, width))
-    node, offset, row, column = np.indices(found.shape)
+    blocks = np.zeros((nodes, 2 * NEAR + 1, width, width))
+    node, offset, row, column = np.indices(blocks.shape)
     rows, columns = node * width + row, (node + offset - NEAR) * width + column
     inside = (columns >= 0) & (columns < size)
     places = (rows - columns + reach)[inside], columns[inside]
 
     def jacobian(t: float, flat: np.ndarray) -> np.ndarray:
-        forces.slopes(t, flat, found, data)
+        forces.slopes(t, flat, blocks, data)
         packed = np.zeros((2 * reach + 1, size))
-        packed[places] = found[inside]
+        packed[places] = blocks[inside]
         return packed
 
     return {"jac": jacobian, "lband": reach, "uband": reach}
@@ -150,29 +150,33 @@ def launched(string: ElasticString, params: Params, draws: np.ndarray = DRAWS) -
     return np.array(landings)
 
 
-def apart(one: Interaction, other: Interaction) -> dict[str, float]:
+def apart(interaction: Interaction, other: Interaction) -> dict[str, float]:
     """By how much two interactions differ at most."""
-    far = np.linalg.norm(one.lines - other.lines, axis=-1).max(axis=1)
-    slipped = one.seen > max(one.slip_time, other.slip_time)
-    held = one.seen < min(one.slip_time, other.slip_time)
+    far = np.linalg.norm(interaction.lines - other.lines, axis=-1).max(axis=1)
+    slipped = interaction.seen > max(interaction.slip_time, other.slip_time)
+    held = interaction.seen < min(interaction.slip_time, other.slip_time)
     return {
-        "force_n": float(np.linalg.norm(one.force - other.force, axis=-1)[_both(one, other)].max()),
-        "hand_m": float(np.linalg.norm(one.hand - other.hand, axis=-1).max()),
-        "slip_s": abs(one.slip_time - other.slip_time),
+        "force_n": float(
+            np.linalg.norm(interaction.force - other.force, axis=-1)[
+                _both(interaction, other)
+            ].max()
+        ),
+        "hand_m": float(np.linalg.norm(interaction.hand - other.hand, axis=-1).max()),
+        "slip_s": abs(interaction.slip_time - other.slip_time),
         "nodes_held_m": float(far[held].max()),
         "nodes_swinging_m": float(far[slipped].max(initial=0.0)),
     }
 
 
-def _both(one: Interaction, other: Interaction) -> np.ndarray:
+def _both(interaction: Interaction, other: Interaction) -> np.ndarray:
     """Of the sensor's times, those at which both hold the band or neither does."""
-    return (one.force != 0).any(axis=1) == (other.force != 0).any(axis=1)
+    return (interaction.force != 0).any(axis=1) == (other.force != 0).any(axis=1)
 
 
 def compared(params: Params, draws: np.ndarray = DRAWS) -> dict[str, Any]:
     """CVODE, CVODE at a tighter tolerance, and LSODA, on a rubber."""
     string = string_of(params, BAND)
-    found: dict[str, tuple[Interaction, np.ndarray, float]] = {}
+    results: dict[str, tuple[Interaction, np.ndarray, float]] = {}
     hanging = hang(string, params.rig.tolerance)
     rig = params.rig.model_copy(update={"tolerance": TIGHTER})
     tighter = params.model_copy(update={"rig": rig})
@@ -180,34 +184,34 @@ def compared(params: Params, draws: np.ndarray = DRAWS) -> dict[str, Any]:
         begin = time.process_time()
         with by_lsoda(TIGHT) if name == "lsoda" else ExitStack():
             happened, landings = pulled(string, hanging, its), launched(string, its, draws)
-        found[name] = happened, landings, time.process_time() - begin
+        results[name] = happened, landings, time.process_time() - begin
 
-    def between(one: str, other: str) -> dict[str, float]:
-        landing = np.abs(found[one][1] - found[other][1]).max()
-        return apart(found[one][0], found[other][0]) | {"landing_m": float(landing)}
+    def between(integrator: str, other: str) -> dict[str, float]:
+        landing = np.abs(results[integrator][1] - results[other][1]).max()
+        return apart(results[integrator][0], results[other][0]) | {"landing_m": float(landing)}
 
     return {
         "cvode_against_lsoda": between("cvode", "lsoda"),
         "tighter_cvode_against_lsoda": between("tighter_cvode", "lsoda"),
         "cvode_against_tighter_cvode": between("cvode", "tighter_cvode"),
-        "cpu_seconds": {name: round(one[2], 1) for name, one in found.items()},
+        "cpu_seconds": {name: round(result[2], 1) for name, result in results.items()},
     }
 
 
 def report(params: Params, rubbers: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """Of the rubbers that are compared."""
     most = {
-        what: max(one["cvode_against_lsoda"][what] for one in rubbers.values()) for what in ASKED
+        what: max(row["cvode_against_lsoda"][what] for row in rubbers.values()) for what in ASKED
     }
-    about = environment("cpu", "python -m validation.campaigns.rig_integrators")
+    provenance = environment("cpu", "python -m validation.campaigns.rig_integrators")
     versions = {name: version(name) for name in ("scikit-sundae", "numba")}
-    return about | {
-        "versions": about["versions"] | versions,
+    return provenance | {
+        "versions": provenance["versions"] | versions,
         "asked": "CVODE at rig.tolerance agrees with LSODA at 1e-8 on the same rates:"
         " force, nodes while held and while they swing slack, landing.",
         "limits": ASKED,
         "tolerance": {"cvode": params.rig.tolerance, "lsoda": TIGHT, "tighter_cvode": TIGHTER},
-        "rubbers": {name: {"rig.bands": RUBBERS[name], **one} for name, one in rubbers.items()},
+        "rubbers": {name: {"rig.bands": RUBBERS[name], **row} for name, row in rubbers.items()},
         "most": most,
         "missed": sorted(what for what, limit in ASKED.items() if most[what] > limit),
         "met": all(most[what] <= limit for what, limit in ASKED.items()),

@@ -60,10 +60,10 @@ def calibrated_clamps(params: Params, band: str, episode: Episode, folder: Path)
 
 def sling_of(params: Params, band: str, method: str, folder: Path) -> ClampedBand:
     """The band as a method takes it, with or without the clamps of its first recording."""
-    about = params.methods[method]
-    mounting = read_json(folder / "mounting.json", Mounting) if about.mounting else None
+    method_params = params.methods[method]
+    mounting = read_json(folder / "mounting.json", Mounting) if method_params.mounting else None
     lab = params.setup, params.sling
-    return ClampedBand.of(params.bands[band], *lab, mounting, law=about.law)
+    return ClampedBand.of(params.bands[band], *lab, mounting, law=method_params.law)
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class RigIdentification:
     """What a method has found in one episode.
 
     Attributes:
-        confidence: What `found` says of it.
+        confidence: What `calibrated_by` says of it.
         theta: Parameters by name.
         seconds: Of the identification.
     """

@@ -137,9 +137,9 @@ def made_once(path: Path, make: Callable[[], object]):
 def plain(value: object, digits: int | None = None):
     """For JSON: NumPy's numbers as Python's, null for what is not finite; floats to some digits."""
     if isinstance(value, dict):
-        return {str(key): plain(one, digits) for key, one in value.items()}
+        return {str(key): plain(part, digits) for key, part in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):
-        return [plain(one, digits) for one in value]
+        return [plain(part, digits) for part in value]
     if isinstance(value, (float, np.floating)):
         if not np.isfinite(value):
             return None

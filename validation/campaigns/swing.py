@@ -72,8 +72,8 @@ class SplitPictures:
             for name, (begin, end) in PARTS.items()
         }
         frames = 100 * loss.frames(rollouts)
-        self.count = {name: int(one.sum()) for name, one in chosen.items()}
-        self.mean = {name: frames[:, one].mean(axis=1) for name, one in chosen.items()}
+        self.count = {name: int(mask.sum()) for name, mask in chosen.items()}
+        self.mean = {name: frames[:, mask].mean(axis=1) for name, mask in chosen.items()}
         middle = rollouts.center_line[:, chosen["swing"], rollouts.center_line.shape[2] // 2]
         self.reach = middle[..., 1].max(axis=1)  # beyond the fork [m]
 
@@ -84,16 +84,16 @@ def by_mesh(params: Params, band: str, episode: Episode) -> dict:
     `sensitivity_cm` is how far the part's pictures alone move the geometric term over DAMPINGS;
     `reach_m` is how far beyond the fork a picture sees the middle of the band with theta as it is.
     """
-    theta, found = parameters_of(load_theta(Layout().theta(band, PAPER), band)), {}
-    own = float(theta.column(D)[0] * theta.column(S)[0])
-    dampings = np.append(DAMPINGS, own)
+    theta, rows = parameters_of(load_theta(Layout().theta(band, PAPER), band)), {}
+    damping = float(theta.column(D)[0] * theta.column(S)[0])
+    dampings = np.append(DAMPINGS, damping)
     for mesh in MESHES:
         done = SplitPictures(
             params, episode, sling_with(params, band, mesh), _damped(theta, dampings)
         )
         whole = sum(done.count.values())
         best = dampings[np.argmin(done.total)]
-        found[mesh] = {
+        rows[mesh] = {
             "loss": {"best_damping_s": best, "lowest": done.total.min(), "own": done.total[-1]},
             "reach_m": float(done.reach[-1]),
         } | {
@@ -104,7 +104,7 @@ def by_mesh(params: Params, band: str, episode: Episode) -> dict:
             }
             for part, mean in done.mean.items()
         }
-    return {"own_damping_s": own, "own_theta": theta.theta[0].tolist(), **found}
+    return {"own_damping_s": damping, "own_theta": theta.theta[0].tolist(), **rows}
 
 
 def sling_with(params: Params, band: str, mesh: str) -> ClampedBand:
@@ -117,7 +117,7 @@ def as_found(params: Params, band: str, results: list[dict]) -> dict:
 
     `landing_ratio` is the mean over DRAWS, and `hold_force_ratio` too, beside rod and rod.
     """
-    found = {
+    thetas = {
         result["switch"]: Parameters.of(NEO_HOOKEAN, result["point"][: len(THETA)])
         for result in results
         if (result["band"], result["method"], result["recording"], result["seed"])
@@ -127,16 +127,16 @@ def as_found(params: Params, band: str, results: list[dict]) -> dict:
     for mesh in MESHES:
         sling = sling_with(params, band, mesh)
         for whose, switch in zip(MESHES, (AS_IS, AS_TETRAHEDRA), strict=True):
-            outcome = launch(sling, setup, found[switch], DRAWS)
+            outcome = launch(sling, setup, thetas[switch], DRAWS)
             done[f"launched with {mesh}, found with {whose}"] = outcome
     first = next(iter(done.values()))
     return {
         name: {
-            "landing_m": one.landing_y.tolist(),
-            "landing_ratio": (one.landing_y / first.landing_y).mean(),
-            "hold_force_ratio": (one.hold_force / first.hold_force).mean(),
+            "landing_m": launches.landing_y.tolist(),
+            "landing_ratio": (launches.landing_y / first.landing_y).mean(),
+            "hold_force_ratio": (launches.hold_force / first.hold_force).mean(),
         }
-        for name, one in done.items()
+        for name, launches in done.items()
     }
 
 
@@ -176,11 +176,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
     args, params = parser.parse_args(), load()
-    results, found = json.loads(made(DEVIATIONS).read_text(encoding="utf-8"))["results"], {}
+    results, bands = json.loads(made(DEVIATIONS).read_text(encoding="utf-8"))["results"], {}
     for band in params.run.bands:
         episode = Episode.load(Layout().episode(band))
         rounding = {method: by_rounding(params, band, method, episode) for method in (OURS, PAPER)}
-        found[band] = {
+        bands[band] = {
             "episode": fingerprint(*sorted(Layout().episode(band).glob("*.parquet"))),
             "meshes": by_mesh(params, band, episode),
             "rounding": rounding,
@@ -197,7 +197,7 @@ def main() -> None:
             "relative_change": TINY,
             "changes": TIMES,
         },
-        "bands": found,
+        "bands": bands,
     }
     write_json(args.report, content | environment("cpu", "python -m validation.campaigns.swing"))
 

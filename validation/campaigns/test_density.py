@@ -35,13 +35,13 @@ def test_recordings_that_this_project_did_not_make(params: Params, progress, rec
     names = ("orange", "orange_2", "orange_3")
     episodes = [orange_episode(params, name) for name in names]
     figures = {}
-    for name, own in [
+    for name, subset in [
         *zip(names, [[episode] for episode in episodes], strict=True),
         ("all", episodes),
     ]:
         place = FOLDER / (name if name in names else names[0])
         sling = sling_of(params, "orange", OURS, place)
-        calibrated, confidence = density.calibrated_by(params, OURS, sling, own)
+        calibrated, confidence = density.calibrated_by(params, OURS, sling, subset)
         error = calibrated(draws).landing_y / measured - 1
         ends = landing_intervals(calibrated, draws, calibrated.samples, 1e-3)
         figures[name] = {
@@ -51,7 +51,7 @@ def test_recordings_that_this_project_did_not_make(params: Params, progress, rec
             "launches": len(measured),
             "mean_width": np.nanmean((ends[:, 1] - ends[:, 0]) / measured),
             "turn_damping": confidence["derived"]["turn_damping"],
-            "pictures": [one["pictures"] for one in confidence["recordings"]],
+            "pictures": [recording["pictures"] for recording in confidence["recordings"]],
         }
         progress(f"  {name}: {100 * figures[name]['bias']:+.2f} %")
     record(

@@ -54,10 +54,10 @@ def oracle_theta(launcher, box: SearchBox, draws: np.ndarray, landing: np.ndarra
     from what was identified.
     """
     free = np.array([name != "dynamic_friction" for name in box.names])
-    found = box.to_unit(np.array([start[name] for name in box.names]))
+    start_unit = box.to_unit(np.array([start[name] for name in box.names]))
 
     def misses(points: np.ndarray) -> np.ndarray:
-        unit = np.tile(found, (len(points), 1))
+        unit = np.tile(start_unit, (len(points), 1))
         unit[:, free] = points
         values = np.repeat(box.to_physical(unit), len(draws), axis=0)
         landed = launcher(np.tile(draws, (len(points), 1)), box.parameters(values))
@@ -71,25 +71,25 @@ def oracle_theta(launcher, box: SearchBox, draws: np.ndarray, landing: np.ndarra
         return ((around[1:] - around[0]) / step[:, None]).T
 
     dimension = int(free.sum())
-    points = np.vstack([found[free], qmc.LatinHypercube(dimension, rng=1).random(STARTS)])
+    points = np.vstack([start_unit[free], qmc.LatinHypercube(dimension, rng=1).random(STARTS)])
     points = np.clip(points, 1e-3, 1 - 1e-3)
     best = points[1 + np.argmin(np.sum(misses(points[1:]) ** 2, axis=1))]
     fits = [
         least_squares(lambda p: misses(p[None])[0], x0, jacobian, bounds=(0, 1), max_nfev=40)
         for x0 in (points[0], best)
     ]
-    fit = min(fits, key=lambda one: one.cost)
-    unit = found.copy()
+    fit = min(fits, key=lambda candidate: candidate.cost)
+    unit = start_unit.copy()
     unit[free] = fit.x
     return dict(zip(box.names, box.to_physical(unit).tolist(), strict=True)), fit.fun
 
 
-def split(params: Params, root: Path, world: World, known: tuple, method: str) -> dict:
+def split(params: Params, root: Path, world: World, trials: tuple, method: str) -> dict:
     """What the error of one method on one band is made of.
 
     Args:
         root: Where θ and policy are; the policy there is then trained anew, by the oracle's θ.
-        known: Draws and landings [m] of the rig without errors, for the oracle's θ.
+        trials: Draws and landings [m] of the rig without errors, for the oracle's θ.
     """
     band, targets = world.band, np.array(params.trials.targets)
     numbers = trial_numbers(params)
@@ -99,16 +99,18 @@ def split(params: Params, root: Path, world: World, known: tuple, method: str) -
     values = content["theta"]
     launcher = simulator(params, band, content, root=root)
     draws = {AS_IT_IS: stored.draws(targets)}
-    own = draws[AS_IT_IS]
+    policy_draws = draws[AS_IT_IS]
     land = lambda draw: float(launcher(draw[None]).landing_y[0])  # noqa: E731
-    draws[AIMED] = np.array([hit(land, g, draw) for g, draw in zip(targets, own, strict=True)])
-    draws[HIT] = world.hits(targets, own)
+    draws[AIMED] = np.array(
+        [hit(land, g, draw) for g, draw in zip(targets, policy_draws, strict=True)]
+    )
+    draws[HIT] = world.hits(targets, policy_draws)
 
     beside = parameters_of(content).sample()
     box = replace(SearchBox.of_method(params, method), fixed={name: beside[name] for name in EXTRA})
-    best, missed = oracle_theta(launcher, box, *known, values)
+    best, missed = oracle_theta(launcher, box, *trials, values)
     fitted = content | {"theta": best, "confidence": None}
-    predicted, aimed = launcher(own).landing_y, simulator(params, band, fitted, root=root)
+    predicted, aimed = launcher(policy_draws).landing_y, simulator(params, band, fitted, root=root)
     write_json(path, fitted)
     run(root, "python", "-m", "stages.policy", band, method)
     draws[THETA_] = stored.draws(targets)
@@ -124,7 +126,7 @@ def split(params: Params, root: Path, world: World, known: tuple, method: str) -
             "bias_without_noise_share": bias / targets,
         }
     landed = variants[AS_IT_IS]["bias_without_noise_m"] + targets
-    by_best = aimed(own).landing_y
+    by_best = aimed(policy_draws).landing_y
     parts = {
         "law": landed - by_best,
         "identification": by_best - predicted,
@@ -160,14 +162,15 @@ def band_figures(params: Params, root: Path, band: str, methods, progress) -> di
         progress(f"  {band}: floor {100 * floor['mean_error_m']:.2f} cm")
         result = {"floor": floor, "methods": {}}
         for method in methods:
-            one = split(params, root, world, (tried, landing), method)
-            result["methods"][method] = one
+            method_figures = split(params, root, world, (tried, landing), method)
+            result["methods"][method] = method_figures
             message = [
                 f"{name} {100 * v['mean_error_m']:.2f} ({100 * v['without_noise_m']:.2f})"
-                for name, v in one["variants"].items()
+                for name, v in method_figures["variants"].items()
             ]
             progress(
-                f"  {band} {method} [cm] (without noise): {', '.join(message)}; {one['limits']}"
+                f"  {band} {method} [cm] (without noise): {', '.join(message)};"
+                f" {method_figures['limits']}"
             )
     return result
 
@@ -178,18 +181,24 @@ def draw_figure(figures: dict, path: Path) -> None:
     with plt.rc_context(THEME):
         size = 3.6 * len(figures), 5.6
         figure, axes = plt.subplots(2, len(figures), figsize=size, squeeze=False)
-        for (band, one), (above, below) in zip(figures.items(), axes.T, strict=True):
-            for number, (method, found) in enumerate(one["methods"].items()):
+        for (band, content), (above, below) in zip(figures.items(), axes.T, strict=True):
+            for number, (method, method_figures) in enumerate(content["methods"].items()):
                 place = np.arange(len(kinds)) + 0.38 * (number - 0.5)
-                error = [100 * found["variants"][kind]["mean_error_m"] for kind in kinds]
-                clean = [100 * found["variants"][kind]["without_noise_m"] for kind in kinds]
+                error = [100 * method_figures["variants"][kind]["mean_error_m"] for kind in kinds]
+                clean = [
+                    100 * method_figures["variants"][kind]["without_noise_m"] for kind in kinds
+                ]
                 above.bar(place, error, 0.36, color=COLORS[number], label=method)
                 above.plot(place, clean, "_", color=INK, ms=12)
-                targets = [float(target) for target in found["variants"][AS_IT_IS]["targets"]]
-                for mark, (name, part) in zip("os^", found["bias_parts_m"].items(), strict=True):
+                targets = [
+                    float(target) for target in method_figures["variants"][AS_IT_IS]["targets"]
+                ]
+                for mark, (name, part) in zip(
+                    "os^", method_figures["bias_parts_m"].items(), strict=True
+                ):
                     look = {"color": COLORS[number], "marker": mark, "lw": 0.8}
                     below.plot(targets, 100 * np.array(part), **look, label=f"{name}, {method}")
-            floor = 100 * one["floor"]["mean_error_m"]
+            floor = 100 * content["floor"]["mean_error_m"]
             above.axhline(floor, color=INK, lw=0.8)
             above.axhline(FACTOR * floor, color=INK, lw=0.8, ls="--")
             above.set(title=band, ylabel="|landing − target| [cm]")
@@ -216,11 +225,11 @@ def test_what_the_error_of_a_landing_is_made_of(tmp_path, progress, record) -> N
     draw_figure(figures, ROOT / "reports/validation/gap.png")
     met = {
         band: bool(
-            not one["methods"][OURS]["variants"][AS_IT_IS]["failed"]
-            and one["methods"][OURS]["variants"][AS_IT_IS]["mean_error_m"]
-            <= FACTOR * one["floor"]["mean_error_m"]
+            not content["methods"][OURS]["variants"][AS_IT_IS]["failed"]
+            and content["methods"][OURS]["variants"][AS_IT_IS]["mean_error_m"]
+            <= FACTOR * content["floor"]["mean_error_m"]
         )
-        for band, one in figures.items()
+        for band, content in figures.items()
     }
     record(
         "gap",

@@ -14,21 +14,22 @@ MOST_OFF, LEAST_COVERED, MOST_STRAYS = 0.003, 0.9, 0.01  # m, shares
 
 
 def test_the_band_is_found_in_every_look(params: Params, progress, record) -> None:
-    found = {}
+    summaries = {}
     for name, look in looks.LOOKS.items():
         view, truths = looks.view_of(look, looks.times(FRAMES))
-        found[name] = figures(view, truths, clouds_of(view, params.cloud))
-        one = found[name]["all"]
+        summaries[name] = figures(view, truths, clouds_of(view, params.cloud))
+        summary = summaries[name]["all"]
         progress(
-            f"  {name}: {1e3 * one['median_off_m']:.1f} mm, {100 * one['covered']:.1f} % covered,"
-            f" {100 * one['further_than_1cm']:.2f} % further than 1 cm"
+            f"  {name}: {1e3 * summary['median_off_m']:.1f} mm,"
+            f" {100 * summary['covered']:.1f} % covered,"
+            f" {100 * summary['further_than_1cm']:.2f} % further than 1 cm"
         )
-    whole = [phases["all"] for phases in found.values()]
+    whole = [phases["all"] for phases in summaries.values()]
     met = all(
-        one["median_off_m"] <= MOST_OFF
-        and one["covered"] >= LEAST_COVERED
-        and one["further_than_1cm"] <= MOST_STRAYS
-        for one in whole
+        summary["median_off_m"] <= MOST_OFF
+        and summary["covered"] >= LEAST_COVERED
+        and summary["further_than_1cm"] <= MOST_STRAYS
+        for summary in whole
     )
     record(
         "looks",
@@ -39,6 +40,6 @@ def test_the_band_is_found_in_every_look(params: Params, progress, record) -> No
         f" {100 * MOST_STRAYS:g} % of the points lie further than 1 cm from it.",
         met=met,
         settings={"frames": FRAMES, "pictures": looks.SIZE, "cloud": params.cloud.model_dump()},
-        figures=found,
+        figures=summaries,
     )
     assert met

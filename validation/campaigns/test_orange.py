@@ -92,7 +92,9 @@ def test_landings_are_predicted_within_the_recorded_stretch(
             "theta": theta["theta"],
             "loss": theta["loss"],
             "rollouts": theta["rollouts"],
-            "mean_and_max_abs_error": {part: asdict(one) for part, one in errors[method].items()},
+            "mean_and_max_abs_error": {
+                part: asdict(error) for part, error in errors[method].items()
+            },
             "launches": launches(trials),
             "recorded_stretch": trials.recorded_stretch[0],
         }

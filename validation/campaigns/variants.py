@@ -50,7 +50,7 @@ BAYES, BAYES_LARGE = (
 
 def with_variants(params: Params) -> Params:
     """params.yaml's methods, and the paper's with one thing plain or left out."""
-    one, optimizer = params.methods[PAPER], params.optimizer
+    paper, optimizer = params.methods[PAPER], params.optimizer
     names = ("generations", "delta", "cma_population", "recombination")
     starts = {name: getattr(optimizer, name) for name in names}
     low, high = optimizer.mutation
@@ -58,21 +58,23 @@ def with_variants(params: Params) -> Params:
 
     def variant(kind: str, **settings):
         search = f"validation.searches:{kind}"
-        return one.model_copy(update={"search": search, "settings": settings})
+        return paper.model_copy(update={"search": search, "settings": settings})
 
     methods = dict(params.methods.items()) | {
         "no_covariance_plain": variant("PlainStarts", k_top=optimizer.k_top, **starts),
         "no_covariance_no_multistart_plain": variant("PlainStarts", k_top=1, **starts),
         LAST: variant("SmallBatches"),
         "plain_adam": variant("PlainAdam"),
-        "no_clamp_calibration": one.model_copy(update={"mounting": False}),
+        "no_clamp_calibration": paper.model_copy(update={"mounting": False}),
     }
     for name, weights in WEIGHTS.items():
-        methods[name] = one.model_copy(update={"weights": Weights(**weights)})
-    methods |= dict.fromkeys(SETTINGS, one)
+        methods[name] = paper.model_copy(update={"weights": Weights(**weights)})
+    methods |= dict.fromkeys(SETTINGS, paper)
     density = params.methods[OURS]
     methods |= dict.fromkeys(PRIOR_CHANGES, density)
-    rubber, plain = ({"law": one.law, "bounds": one.bounds} for one in (density, methods[PAPER]))
+    rubber, plain = (
+        {"law": method.law, "bounds": method.bounds} for method in (density, methods[PAPER])
+    )
     methods |= {
         "search_rubber": methods[PAPER].model_copy(update=rubber),
         "density_neo_hookean": density.model_copy(update=plain),

@@ -157,9 +157,9 @@ def launch_check(
         mujoco_flex.launch(sling, setup, theta, draw, step, **mesh)
         for theta, draw in zip(thetas, draws, strict=True)
     ]
-    landing = 100 * (np.array([one.landing_y for one in theirs]) / ours.landing_y - 1)
-    speed = 100 * (np.array([one.speed for one in theirs]) / ours.speed - 1)
-    hold = 100 * (np.array([one.hold_force for one in theirs]) / ours.hold_force - 1)
+    landing = 100 * (np.array([flight.landing_y for flight in theirs]) / ours.landing_y - 1)
+    speed = 100 * (np.array([flight.speed for flight in theirs]) / ours.speed - 1)
+    hold = 100 * (np.array([flight.hold_force for flight in theirs]) / ours.hold_force - 1)
     return Measure(
         f"landing of {len(cases)} launches, the largest difference{title}",
         "MuJoCo 3D flex",

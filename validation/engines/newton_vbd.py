@@ -62,8 +62,8 @@ class Bands:
         young, poisson, damping = map(float, theta[:3])
         self.tube, self.theta = tube, theta
         mu = young / (2 * (1 + poisson))
-        one = newton.ModelBuilder(gravity=(0.0, 0.0, -GRAVITY))
-        one.add_soft_mesh(
+        builder = newton.ModelBuilder(gravity=(0.0, 0.0, -GRAVITY))
+        builder.add_soft_mesh(
             pos=wp.vec3(0.0),
             rot=wp.quat_identity(),
             scale=1.0,
@@ -78,10 +78,10 @@ class Bands:
         )
         held = np.zeros(tube.rest.shape[:2], bool)
         held[[0, 1, tube.middle, -2, -1]] = True
-        one.particle_mass[:] = np.where(held.ravel(), 0.0, tube.mass).tolist()
-        one.color()
+        builder.particle_mass[:] = np.where(held.ravel(), 0.0, tube.mass).tolist()
+        builder.color()
         many = newton.ModelBuilder(gravity=(0.0, 0.0, -GRAVITY))
-        many.replicate(one, count)
+        many.replicate(builder, count)
         self.model = many.finalize(device=device)
         self.solver = newton.solvers.SolverVBD(self.model, iterations=iterations)
         self.states = [self.model.state(), self.model.state()]

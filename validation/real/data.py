@@ -54,17 +54,17 @@ def multiaxial(folder: Path) -> dict[str, dict[str, np.ndarray]]:
 
     Cauchy stresses are taken back to nominal ones.
     """
-    found: dict[str, dict[str, list]] = {}
+    sources: dict[str, dict[str, list]] = {}
     file = folder / "rubber_multiaxial" / "rubber_multiaxial.csv"
     with file.open(encoding="utf-8-sig") as lines:
         for row in csv.DictReader(lines):
             stretches = [float(row[name]) for name in ("F11", "F22", "F33")]
             stresses = [float(row[name] or "nan") for name in ("S11", "S22")]
             if row["stress_type"] == "cauchy":
-                stresses = [s / one for s, one in zip(stresses, stretches, strict=False)]
-            modes = found.setdefault(row["source"], {})
+                stresses = [s / stretch for s, stretch in zip(stresses, stretches, strict=False)]
+            modes = sources.setdefault(row["source"], {})
             modes.setdefault(row["mode"], []).append([*stretches, *stresses])
-    return {source: {m: np.array(v) for m, v in modes.items()} for source, modes in found.items()}
+    return {source: {m: np.array(v) for m, v in modes.items()} for source, modes in sources.items()}
 
 
 def latex(folder: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -82,12 +82,12 @@ def latex(folder: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def acrylic(folder: Path) -> list[Curve]:
     """VHB 4910, no rubber: cycles at three rates and holds of 400 s."""
-    found = []
+    curves = []
     for file in sorted((folder / "vhb4910").glob("*.csv")):
         with file.open(encoding="utf-8-sig") as lines:
             table = np.array([[float(cell) for cell in row] for row in list(csv.reader(lines))[1:]])
-        found.append(Curve(file.stem, table[:, 1], table[:, 2], table[:, 0]))
-    return found
+        curves.append(Curve(file.stem, table[:, 1], table[:, 2], table[:, 0]))
+    return curves
 
 
 def ropes(folder: Path) -> dict[str, list[np.ndarray]]:
@@ -95,8 +95,8 @@ def ropes(folder: Path) -> dict[str, list[np.ndarray]]:
 
     100 frames a second. Two robots move the ends; Chen et al., CoRL 2024, `deform_dlo_mocap`.
     """
-    found: dict[str, list[np.ndarray]] = {}
+    runs: dict[str, list[np.ndarray]] = {}
     for file in sorted((folder / "deform_dlo_mocap").glob("DLO*.npy")):
         run = np.load(file, allow_pickle=False).astype(float)
-        found.setdefault(file.stem.partition("_")[0], []).append(run.transpose(0, 2, 1))
-    return found
+        runs.setdefault(file.stem.partition("_")[0], []).append(run.transpose(0, 2, 1))
+    return runs

@@ -24,13 +24,13 @@ def draw(folder: Path, source: Path, content: dict) -> None:
         axis.set_visible(False)
     for axis, whole in zip(axes.flat, curves, strict=False):
         curve = whole.up_to(1.85)
-        found = content["silicones"]["specimens"][whole.name]["1.85"]
+        fit = content["silicones"]["specimens"][whole.name]["1.85"]
         stretch = np.linspace(1, 1.85, 100)
-        pulled = np.maximum(stretch - found["slack"], 1.0)
-        law = found["shear_modulus"] * uniaxial(pulled, found["mooney_share"], found["upturn"])
+        pulled = np.maximum(stretch - fit["slack"], 1.0)
+        law = fit["shear_modulus"] * uniaxial(pulled, fit["mooney_share"], fit["upturn"])
         axis.plot(curve.stretch, curve.stress, ".", color="0.55", markersize=3)
         axis.plot(stretch, law, color="tab:blue", linewidth=1)
-        axis.set_title(f"{whole.name.replace('_', ' ')}: {found['rms_percent']:.2g} %", fontsize=7)
+        axis.set_title(f"{whole.name.replace('_', ' ')}: {fit['rms_percent']:.2g} %", fontsize=7)
         axis.tick_params(labelsize=6)
     figure.supxlabel("stretch", fontsize=8)
     figure.supylabel("nominal stress [MPa]", fontsize=8)
@@ -49,12 +49,12 @@ def draw_ropes(
         run, other = runs[name], summary[name]
         for k, frame in enumerate(np.linspace(0, len(run) - 1, 5).astype(int)[1:]):
             side, top = _side(run[frame]), run[frame, [0, -1], 2].max() + APART * k
-            for one, style in ((run, "o-"), (other, "-")):
-                place = (one[frame] - run[frame, 0]) @ side
-                look = {"color": "0.6" if one is run else "tab:blue", "lw": 1, "ms": 2}
-                shape.plot(place, one[frame, :, 2] - top, style, **look)
-        found = content["ropes"][name]["predicted_run"]
-        shape.set_title(f"{name}: {found['rms_mm']:.0f} mm", fontsize=8)
+            for markers, style in ((run, "o-"), (other, "-")):
+                place = (markers[frame] - run[frame, 0]) @ side
+                look = {"color": "0.6" if markers is run else "tab:blue", "lw": 1, "ms": 2}
+                shape.plot(place, markers[frame, :, 2] - top, style, **look)
+        prediction = content["ropes"][name]["predicted_run"]
+        shape.set_title(f"{name}: {prediction['rms_mm']:.0f} mm", fontsize=8)
         shape.set_aspect("equal")
         gaps = np.linalg.norm(other - run, axis=2)[:, 2:-2]
         error.plot(np.arange(len(run)) / 100, 1e3 * np.sqrt((gaps**2).mean(1)), linewidth=1)

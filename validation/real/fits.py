@@ -62,9 +62,9 @@ def shape_of(curve: Curve, slack: float = 0.0) -> CurveFit:
         return (x[0] * uniaxial(stretch, x[1], x[2]) - curve.stress) / peak
 
     begin = [peak / 2, START["mooney_share"], START["upturn"], slack / 2]
-    found = least_squares(left, begin, bounds=(low, high), x_scale=[peak, 0.1, 0.05, 0.01])
+    solution = least_squares(left, begin, bounds=(low, high), x_scale=[peak, 0.1, 0.05, 0.01])
     names = "shear_modulus", "mooney_share", "upturn", "slack"
-    return CurveFit(dict(zip(names, map(float, found.x), strict=True)), found.fun)
+    return CurveFit(dict(zip(names, map(float, solution.x), strict=True)), solution.fun)
 
 
 def noise_of(curve: Curve) -> float:
@@ -89,17 +89,17 @@ def memory_of(curves: list[Curve], names: tuple[str, ...] = NAMES) -> list[Curve
 
     low, high = np.array([REACH[name] for name in names]).T
     begin = [peak / 2, *(START[name] for name in names)]
-    found = least_squares(
+    solution = least_squares(
         lambda x: np.concatenate(left(x)),
         begin,
         bounds=([1e-6 * peak, *low], [1e3 * peak, *high]),
         x_scale=[peak, *(0.1 for _ in names)],
     )
     summary = {
-        "shear_modulus": float(found.x[0]),
-        **{k: float(v) for k, v in values(found.x).items()},
+        "shear_modulus": float(solution.x[0]),
+        **{k: float(v) for k, v in values(solution.x).items()},
     }
-    return [CurveFit(summary, one) for one in left(found.x)]
+    return [CurveFit(summary, residuals) for residuals in left(solution.x)]
 
 
 def biaxial(rows: np.ndarray, shape: tuple[float, float]) -> np.ndarray:

@@ -158,7 +158,7 @@ def fitted(
 
     low, high = np.log([REACH[name] for name in NAMES]).T
     begin = np.log([start[name] for name in NAMES])
-    found = least_squares(
+    solution = least_squares(
         left, begin, bounds=(low, high), diff_step=1e-2, ftol=1e-3, xtol=1e-3, max_nfev=8
     )
-    return dict(zip(NAMES, np.exp(found.x).tolist(), strict=True))
+    return dict(zip(NAMES, np.exp(solution.x).tolist(), strict=True))

@@ -256,7 +256,7 @@ def blind_bag(folder: Path, truth: Truth | None = None, **options: object) -> Pa
 
 def render(truth: Truth, t: float, lens: Lens = LENS) -> tuple[np.ndarray, np.ndarray]:
     """Colour (BGR) and depth (mm) of floor, fork, arm and band."""
-    color, depth = (one.copy() for one in _still(lens, truth.floor))
+    color, depth = (picture.copy() for picture in _still(lens, truth.floor))
     hand = truth.hand(t)
     palm = hand - np.linspace(0.07, 0.3, 15)[:, None] * [0, 1, 0]
     side = 0.5 * (0.016 if truth.holds(t) else 0.08) + 0.012

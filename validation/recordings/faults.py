@@ -72,21 +72,21 @@ def frozen(bag: Bag, seconds: float) -> None:
     for word in ("color", "depth"):
         pictures = bag.of(IMAGE, word)
         times, last = bag.seconds(pictures), pictures[0]
-        for time, one in zip(times, pictures, strict=True):
+        for time, message in zip(times, pictures, strict=True):
             if begin <= time < begin + seconds:
-                one.content.data = last.content.data
+                message.content.data = last.content.data
             else:
-                last = one
+                last = message
 
 
 def smeared(bag: Bag, share: float) -> None:
     """A filter over time holds so much of the depth picture before, as drivers offer."""
     before = None
-    for one in bag.of(IMAGE, "depth"):
-        now = _depth(one).astype(float)
+    for message in bag.of(IMAGE, "depth"):
+        now = _depth(message).astype(float)
         if before is not None:
             now = np.where((now > 0) & (before > 0), share * before + (1 - share) * now, now)
-        _set_depth(one, before := now)
+        _set_depth(message, before := now)
 
 
 def turned(bag: Bag, degrees: float) -> None:
@@ -138,31 +138,31 @@ def in_bursts(bag: Bag, count: float) -> None:
     for begin in range(0, len(messages), count):
         block = messages[begin : begin + count]
         end = block[-1].stamp
-        for place, one in enumerate(block):
-            one.stamp = end + 8000 * place
-            one.log = one.stamp + 100_000
+        for place, message in enumerate(block):
+            message.stamp = end + 8000 * place
+            message.log = message.stamp + 100_000
 
 
 def repeated(what: str, bag: Bag, count: float) -> None:
     """A slower topic's value is sent again with new stamps."""
     name = "wrench" if what == "force" else "pose"
     last = None
-    for place, one in enumerate(_messages(bag, what)):
-        last = getattr(one.content, name) if place % int(count) == 0 else last
-        setattr(one.content, name, copy.deepcopy(last))
+    for place, message in enumerate(_messages(bag, what)):
+        last = getattr(message.content, name) if place % int(count) == 0 else last
+        setattr(message.content, name, copy.deepcopy(last))
 
 
 def depth_scaled(bag: Bag, factor: float) -> None:
-    for one in bag.of(IMAGE, "depth"):
-        _set_depth(one, _depth(one).astype(float) * factor)
+    for message in bag.of(IMAGE, "depth"):
+        _set_depth(message, _depth(message).astype(float) * factor)
 
 
 def focal_off(bag: Bag, percent: float) -> None:
-    for one in bag.of(INFO):
+    for message in bag.of(INFO):
         for name, places in (("k", (0, 4)), ("p", (0, 5))):
-            matrix = np.array(getattr(one.content, name))
+            matrix = np.array(getattr(message.content, name))
             matrix[list(places)] *= 1 + percent / 100
-            setattr(one.content, name, matrix)
+            setattr(message.content, name, matrix)
 
 
 def camera_moved(bag: Bag, mm: float) -> None:
@@ -181,10 +181,10 @@ def camera_turned(bag: Bag, degrees: float) -> None:
 def another_arm(bag: Bag, noise: float) -> None:
     """It rests beside the one that pulls, and its topics come first by name."""
     rng = np.random.default_rng(1)
-    for one in [*bag.of(FORCE), *bag.of(POSE)]:
-        other = copy.deepcopy(one)
-        other.topic, one.topic = f"/a_left{one.topic}", f"/b_right{one.topic}"
-        if one.type.endswith(FORCE):
+    for message in [*bag.of(FORCE), *bag.of(POSE)]:
+        other = copy.deepcopy(message)
+        other.topic, message.topic = f"/a_left{message.topic}", f"/b_right{message.topic}"
+        if message.type.endswith(FORCE):
             force = other.content.wrench.force
             force.x, force.y, force.z = map(float, rng.normal(0, noise, 3))
         else:
@@ -195,8 +195,8 @@ def another_arm(bag: Bag, noise: float) -> None:
 
 def dead_force(bag: Bag, value: float) -> None:
     """Another topic of forces, always the same."""
-    for one in bag.of(FORCE):
-        other = copy.deepcopy(one)
+    for message in bag.of(FORCE):
+        other = copy.deepcopy(message)
         other.topic, force = "/a_sensor/wrench", other.content.wrench.force
         force.x, force.y, force.z = 0.0, 0.0, value
         bag.messages.append(other)
@@ -204,8 +204,8 @@ def dead_force(bag: Bag, value: float) -> None:
 
 def opening_as(kind: str, bag: Bag, size: float) -> None:
     """The gripper tells an angle that grows as it closes, a percentage, or mirrored fingers."""
-    for one in bag.of(GRIPPER):
-        state = one.content
+    for message in bag.of(GRIPPER):
+        state = message.content
         opening = float(np.sum(state.position))
         if kind == "angle":
             state.name, state.position = ["finger_joint"], [size * (1 - opening / LAST_OPEN)]
@@ -228,16 +228,16 @@ def stale(bag: Bag, seconds: float) -> None:
 
 def padded(bag: Bag, count: float) -> None:
     """JPEGs with zeros behind their end."""
-    for one in bag.of(IMAGE, "color"):
-        one.content.data = np.append(one.content.data, np.zeros(int(count), np.uint8))
+    for message in bag.of(IMAGE, "color"):
+        message.content.data = np.append(message.content.data, np.zeros(int(count), np.uint8))
 
 
 def torn(bag: Bag, share: float) -> None:
     """So many colour pictures are no pictures."""
     rng = np.random.default_rng(2)
-    for one in bag.of(IMAGE, "color"):
+    for message in bag.of(IMAGE, "color"):
         if rng.random() < share:
-            one.content.data = np.full(1000, 7, np.uint8)
+            message.content.data = np.full(1000, 7, np.uint8)
 
 
 def _place(bag: Bag, second: float) -> int:
@@ -250,18 +250,18 @@ def _pull(bag: Bag) -> np.ndarray:
     return pull / np.linalg.norm(pull)
 
 
-def _depth(one: Message) -> np.ndarray:
-    packed = np.frombuffer(bytes(one.content.data)[HEAD:], np.uint8)
+def _depth(message: Message) -> np.ndarray:
+    packed = np.frombuffer(bytes(message.content.data)[HEAD:], np.uint8)
     picture = cv2.imdecode(packed, cv2.IMREAD_UNCHANGED)
     assert picture is not None
     return picture
 
 
-def _set_depth(one: Message, values: np.ndarray) -> None:
+def _set_depth(message: Message, values: np.ndarray) -> None:
     picture = np.clip(np.round(values), 0, 65535).astype(np.uint16)
     packed = cv2.imencode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
-    head = np.frombuffer(bytes(one.content.data)[:HEAD], np.uint8)
-    one.content.data = np.concatenate([head, packed.ravel()])
+    head = np.frombuffer(bytes(message.content.data)[:HEAD], np.uint8)
+    message.content.data = np.concatenate([head, packed.ravel()])
 
 
 def _optical(bag: Bag):

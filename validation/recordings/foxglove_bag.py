@@ -101,13 +101,13 @@ def _axes(vector: object, names: str) -> dict[str, float]:
     return {name: getattr(vector, name) for name in names}
 
 
-def _transform(one: object) -> dict[str, object]:
+def _transform(transform: object) -> dict[str, object]:
     return {
-        "timestamp": {"sec": one.header.stamp.sec, "nsec": one.header.stamp.nanosec},
-        "parent_frame_id": one.header.frame_id,
-        "child_frame_id": one.child_frame_id,
-        "translation": _axes(one.transform.translation, "xyz"),
-        "rotation": _axes(one.transform.rotation, "xyzw"),
+        "timestamp": {"sec": transform.header.stamp.sec, "nsec": transform.header.stamp.nanosec},
+        "parent_frame_id": transform.header.frame_id,
+        "child_frame_id": transform.child_frame_id,
+        "translation": _axes(transform.transform.translation, "xyz"),
+        "rotation": _axes(transform.transform.rotation, "xyzw"),
     }
 
 
@@ -151,7 +151,7 @@ class _Protobuf:
 def _timed(content: dict[str, object]) -> dict[str, object]:
     """Stamps as protobuf's have their fields, also of what lies in a list."""
     timed = {
-        name: [_timed(one) for one in value] if name in ("transforms", "joints") else value
+        name: [_timed(part) for part in value] if name in ("transforms", "joints") else value
         for name, value in content.items()
     }
     if "timestamp" in content:
@@ -164,10 +164,10 @@ def _wrench_file() -> FileDescriptorProto:
     file = FileDescriptorProto(name="lab.proto", package="lab", syntax="proto3")
 
     def message(name: str, **kinds: object) -> None:
-        one = file.message_type.add(name=name)
+        descriptor = file.message_type.add(name=name)
         for number, (field, kind) in enumerate(kinds.items(), 1):
             nested = isinstance(kind, str)
-            one.field.add(
+            descriptor.field.add(
                 name=field,
                 number=number,
                 label=Field.LABEL_OPTIONAL,

@@ -297,7 +297,9 @@ def view_of(look: Appearance, stamps: np.ndarray, seed: int = 0) -> tuple[View, 
 def assemble(look: Appearance, stamps: np.ndarray, colors: list, depths: list) -> View:
     """A view of these pictures, as if they had been read of a recording."""
     nanoseconds = np.round(stamps * 1e9).astype(np.int64)
-    colors = [replace(one, stamp=int(t)) for one, t in zip(colors, nanoseconds, strict=True)]
+    colors = [
+        replace(picture, stamp=int(t)) for picture, t in zip(colors, nanoseconds, strict=True)
+    ]
     apart = look.offset is not None
     recording = Recording(
         path=Path("look.mcap"),

@@ -49,19 +49,21 @@ def score(
 
 def figures(view: View, truths: list[FrameTruth], clouds: object) -> dict[str, dict[str, float]]:
     """Of all frames and of each phase: median distance from the surface, covered share, strays."""
-    found: dict[str, list] = {"all": []}
+    phase_scores: dict[str, list] = {"all": []}
     numbered = zip(view.frames(), clouds.points, strict=True)
     for (number, frame), points in numbered:
-        one = score(view, frame, truths[number], points)
-        found["all"].append(one)
-        found.setdefault(phase(frame.time), []).append(one)
+        frame_score = score(view, frame, truths[number], points)
+        phase_scores["all"].append(frame_score)
+        phase_scores.setdefault(phase(frame.time), []).append(frame_score)
     summary = {}
-    for name, scores in found.items():
-        off = np.concatenate([one["off"] for one in scores])
+    for name, scores in phase_scores.items():
+        off = np.concatenate([frame_score["off"] for frame_score in scores])
         summary[name] = {
             "frames": len(scores),
             "median_off_m": float(np.median(off)),
-            "covered": float(np.mean(np.concatenate([one["covered"] for one in scores]))),
+            "covered": float(
+                np.mean(np.concatenate([frame_score["covered"] for frame_score in scores]))
+            ),
             "further_than_1cm": float(np.mean(off > 0.01)),
         }
     return summary

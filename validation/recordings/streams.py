@@ -46,32 +46,34 @@ class Bag:
 
     @classmethod
     def read(cls, path: Path) -> Bag:
-        found = []
+        messages = []
         with path.open("rb") as file:
-            for schema, channel, one in make_reader(file).iter_messages(log_time_order=False):
+            for schema, channel, record in make_reader(file).iter_messages(log_time_order=False):
                 assert schema is not None
-                content = STORE.deserialize_cdr(one.data, schema.name)
-                found.append(Message(channel.topic, schema.name, one.log_time, content))
-        return cls(found)
+                content = STORE.deserialize_cdr(record.data, schema.name)
+                messages.append(Message(channel.topic, schema.name, record.log_time, content))
+        return cls(messages)
 
     def write(self, path: Path) -> None:
         with replacing(path) as temporary, temporary.open("wb") as file:
             writer, channels = Writer(file), {}
             writer.start("ros2", "validation")
-            for one in sorted(self.messages, key=lambda message: message.log):
-                if (one.topic, one.type) not in channels:
-                    definition = STORE.generate_msgdef(one.type)[0].encode()
-                    schema = writer.register_schema(one.type, "ros2msg", definition)
-                    channel = writer.register_channel(one.topic, "cdr", schema)
-                    channels[one.topic, one.type] = channel
-                data = bytes(STORE.serialize_cdr(one.content, one.type))
-                writer.add_message(channels[one.topic, one.type], one.log, data, one.log)
+            for message in sorted(self.messages, key=lambda message: message.log):
+                if (message.topic, message.type) not in channels:
+                    definition = STORE.generate_msgdef(message.type)[0].encode()
+                    schema = writer.register_schema(message.type, "ros2msg", definition)
+                    channel = writer.register_channel(message.topic, "cdr", schema)
+                    channels[message.topic, message.type] = channel
+                data = bytes(STORE.serialize_cdr(message.content, message.type))
+                writer.add_message(
+                    channels[message.topic, message.type], message.log, data, message.log
+                )
             writer.finish()
 
     def of(self, kind: str, word: str = "") -> list[Message]:
         """Of a type, on topics that hold a word, by stamp."""
-        found = [m for m in self.messages if m.type.endswith(f"/{kind}") and word in m.topic]
-        return found if kind == FRAMES else sorted(found, key=lambda message: message.stamp)
+        matches = [m for m in self.messages if m.type.endswith(f"/{kind}") and word in m.topic]
+        return matches if kind == FRAMES else sorted(matches, key=lambda message: message.stamp)
 
     @property
     def robot(self) -> list[Message]:
@@ -94,13 +96,13 @@ class Bag:
     @property
     def force(self) -> np.ndarray:
         """Shape (S, 3) [N]."""
-        summary = [one.content.wrench.force for one in self.of(FORCE)]
+        summary = [message.content.wrench.force for message in self.of(FORCE)]
         return np.array([[force.x, force.y, force.z] for force in summary])
 
     @force.setter
     def force(self, values: np.ndarray) -> None:
-        for one, value in zip(self.of(FORCE), values, strict=True):
-            force = one.content.wrench.force
+        for message, value in zip(self.of(FORCE), values, strict=True):
+            force = message.content.wrench.force
             force.x, force.y, force.z = map(float, value)
 
     @property

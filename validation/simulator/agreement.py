@@ -102,8 +102,8 @@ def compare(
     mass = bench.params.setup.projectile_mass
     for name, scene in scenes(sling or band_of(bench), mass).items():
         states, forces = [], []
-        for one in thetas:
-            theta = Parameters.of(scene.sling.law, one, **others)
+        for sample in thetas:
+            theta = Parameters.of(scene.sling.law, sample, **others)
             start = scene.guess.copy()
             if scene.before is not None:
                 table = relaxation(scene.grip)
@@ -113,7 +113,7 @@ def compare(
             options = {"payload": scene.payload}
             motion = move(bench, scene.sling, theta, scene.steps, start, **options, **TIGHT)
             band = ReferenceRod(scene.sling, theta, **options)
-            expected = march(band, scene.steps, start, friction=2 * one[3])
+            expected = march(band, scene.steps, start, friction=2 * sample[3])
             size, pull = np.abs(expected.x - start).max(), np.abs(expected.force).max()
             states.append(np.abs(motion.x[0] - expected.x).max() / size)
             forces.append(np.abs(motion.force[0] - expected.force).max() / max(pull, 1e-9))
@@ -127,8 +127,8 @@ def checks(
     against = "NumPy reference implementation, Newton's method to rounding"
     note = f"{count} random θ of the box, double precision"
     result = []
-    found = compare(bench, random_thetas(bench, count), sling, **others)
-    for name, (states, forces) in found.items():
+    differences = compare(bench, random_thetas(bench, count), sling, **others)
+    for name, (states, forces) in differences.items():
         result.append(
             Measure(f"states of a band {name}", against, states, "of its motion", LIMIT, note)
         )

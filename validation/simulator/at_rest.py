@@ -67,7 +67,7 @@ def straight_pull(
         gravity=0.0,
     )
     measured = np.where(motion.failed, np.nan, -motion.force[:, -1, 0])
-    return measured, np.array([float(String.of(sling, one).force(stretch)) for one in theta])
+    return measured, np.array([float(String.of(sling, row).force(stretch)) for row in theta])
 
 
 def drawn_pull(bench: Bench, depth: float, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -79,7 +79,7 @@ def drawn_pull(bench: Bench, depth: float, theta: np.ndarray) -> tuple[np.ndarra
     done = launch(
         sling, setup, parameters, [-depth, 0.0], device=bench.device, workers=bench.workers
     )
-    strings = [String.of(sling, one) for one in theta]
+    strings = [String.of(sling, row) for row in theta]
     expected = [2 * float(string.force(stretch)) * depth / half for string in strings]
     return done.hold_force, np.array(expected)
 
@@ -172,13 +172,13 @@ def beams(bench: Bench, poissons=BEAM_POISSON, double: bool = True) -> list[Meas
                 Measure(
                     title,
                     f"Euler–Bernoulli, {formula}",
-                    off(one, 1.0),
+                    off(deflection, 1.0),
                     "%",
                     limit,
-                    f"{one:.4f} of it on {count} edges, {note}"
+                    f"{deflection:.4f} of it on {count} edges, {note}"
                     + (MESH if all(clamped) and limit else ""),
                 )
-                for title, one, limit, count in both
+                for title, deflection, limit, count in both
             ]
     return checks
 
@@ -233,7 +233,7 @@ def torsion(bench: Bench, poissons=BEAM_POISSON) -> list[Measure]:
 def curves(bench: Bench, stretch: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Measured and closed-form pull over E A at stretches (S,), by pair of E and nu."""
     pairs = thetas((3e4, 1e7), (0.30, 0.49))
-    pulls = np.array([straight_pull(bench, one, pairs, STRING) for one in stretch])
+    pulls = np.array([straight_pull(bench, ratio, pairs, STRING) for ratio in stretch])
     thin = band_of(bench).area / STRING**2
     return {
         f"E {theta[0] / 1e6:g} MPa, ν {theta[1]:.2f}": tuple(pulls[:, :, k].T / theta[0] / thin)

@@ -222,12 +222,14 @@ def oscillator(bench: Bench, cases=None, per_period: int = 800) -> list[Measure]
         )
         where = f"{('along', 'across')[axis]} the band, ν {poisson:.2f}, s {scale:g}"
         against = "m x'' + c x' + k x = 0, k and c from E, ν, d, s at stretch 1.5"
-        for name, one, other, limit, unit in (
+        for name, estimate, other, limit, unit in (
             ("frequency", fitted[0], closed[0], FREQUENCY_LIMIT, "Hz"),
             ("decay", fitted[1], closed[1], DECAY_LIMIT, "/s"),
         ):
-            note = f"{one:.4g} {unit}, closed form {other:.4g} {unit}"
-            checks.append(Measure(f"{name} {where}", against, off(one, other), "%", limit, note))
+            note = f"{estimate:.4g} {unit}, closed form {other:.4g} {unit}"
+            checks.append(
+                Measure(f"{name} {where}", against, off(estimate, other), "%", limit, note)
+            )
     theta = [1e6, 0.45, 2e-2, 0.5, 1.0]
     slow, fast = (
         oscillate(bench, theta, axis=1, per_period=per_period, turn_damping=share)[index][1]

@@ -84,7 +84,7 @@ def slings(params) -> dict[str, ClampedBand]:
     shapes = (params.sling.model_copy(update={"mesh": mesh}) for mesh in (ROD, TETRAHEDRA))
     made = (ClampedBand.of(band, params.setup, shape) for shape in shapes)
     # tetrahedra feel no cylinder's drag
-    rod, solid = (replace(one, air_density=0.0) for one in made)
+    rod, solid = (replace(sling, air_density=0.0) for sling in made)
     finer = replace(solid, edges=2 * solid.edges)
     return {"rod": rod, "tetrahedra": solid, "tetrahedra, twice as many": finer}
 
@@ -153,7 +153,9 @@ def measure(bench: Bench, sling: ClampedBand, count: int = COUNT) -> Figures:
 def compare(figures: Figures, rod: Figures) -> dict[str, float]:
     """Differences of an element from the rod, by what and [unit]."""
     times, frames = rod.rollouts.times, rod.rollouts.cloud_time
-    peaks = [np.linalg.norm(one.rollouts.force, axis=2).max(axis=1) for one in (figures, rod)]
+    peaks = [
+        np.linalg.norm(element.rollouts.force, axis=2).max(axis=1) for element in (figures, rod)
+    ]
     gap = np.linalg.norm(figures.lines - rod.lines, axis=3)
     # the hand holds the band while there is a force
     first, last = times[np.linalg.norm(rod.rollouts.force[0], axis=1) > 0][[0, -1]]
@@ -200,7 +202,7 @@ def table(columns: dict[str, Figures]) -> str:
     for name in far[0]:
         what, _, unit = name.rstrip("]").partition(" [")
         sign = "" if unit == "mm" else "+"
-        values = ["", *(f"{one[name]:{sign}.2f} {unit}" for one in far[1:])]
+        values = ["", *(f"{difference[name]:{sign}.2f} {unit}" for difference in far[1:])]
         rows.append((f"{what}, against the rod", values))
     seconds = [(column.rollout_seconds, column.launch_seconds) for column in columns.values()]
     rows += [
@@ -235,14 +237,14 @@ def section(bench: Bench) -> Theme:
     rod = next(iter(columns.values()))
     details = {
         name: {
-            "pull_over_string": list(map(_known, one.pull)),
-            "bending_over_euler_bernoulli": list(map(_known, one.bending)),
-            "against_the_rod": {key: _known(value) for key, value in compare(one, rod).items()},
-            "cpu_s_a_rollout": one.rollout_seconds,
-            "cpu_s_a_launch": one.launch_seconds,
-            "bytes_a_rollout": one.memory,
-            "failed": failures(one),
+            "pull_over_string": list(map(_known, column.pull)),
+            "bending_over_euler_bernoulli": list(map(_known, column.bending)),
+            "against_the_rod": {key: _known(value) for key, value in compare(column, rod).items()},
+            "cpu_s_a_rollout": column.rollout_seconds,
+            "cpu_s_a_launch": column.launch_seconds,
+            "bytes_a_rollout": column.memory,
+            "failed": failures(column),
         }
-        for name, one in columns.items()
+        for name, column in columns.items()
     }
     return Theme("Rod and tetrahedra", [], TEXT + table(columns), details=details)

@@ -37,15 +37,15 @@ def held_force(
 
 def young(bench: Bench) -> list[Measure]:
     sling = replace(band_of(bench), mass=1e-4, grip_force=1e5)
-    one, two = held_force(bench, sling, _with(youngs_modulus=THETA[0] * np.array([1.0, 2.0])))
+    single, two = held_force(bench, sling, _with(youngs_modulus=THETA[0] * np.array([1.0, 2.0])))
     return [
         Measure(
             "held force at 2 E over that at E",
             "2",
-            off(two / one, 2.0),
+            off(two / single, 2.0),
             "%",
             0.5,
-            f"{two / one:.4f}; a weightless band in the episode, held fast",
+            f"{two / single:.4f}; a weightless band in the episode, held fast",
         )
     ]
 
@@ -151,7 +151,7 @@ def friction(bench: Bench, count: int = 33) -> list[Measure]:
     reasons = done.failure
     holds = np.array([reason is None for reason in reasons])
     named = all(reason in (None, SLIP) for reason in reasons)
-    found = tries[holds].min() if holds.any() and named else np.nan
+    threshold = tries[holds].min() if holds.any() and named else np.nan
 
     mu = max(2 * least, 0.05)
     open_ = interact(sling, episode, _with(dynamic_friction=mu), device=bench.device)
@@ -165,10 +165,10 @@ def friction(bench: Bench, count: int = 33) -> list[Measure]:
         Measure(
             "least friction that holds the pull",
             "Coulomb, F = 2 μ N",
-            off(found, least),
+            off(threshold, least),
             "%",
             0.25,
-            f"{found:.4f}; {peak:.2f} N, pads of {sling.grip_force:g} N; below it: “{SLIP}”",
+            f"{threshold:.4f}; {peak:.2f} N, pads of {sling.grip_force:g} N; below it: “{SLIP}”",
         ),
         Measure(
             "θ below it that do not slip",

@@ -129,7 +129,7 @@ def order_in_time(bench: Bench, count: int = COUNT) -> list[Measure]:
             "",
             SHORT_OF_2,
             f"lowest order {lowest:.2f} of any launch from steps of the default to 1/8 of it; at"
-            f" 1, 1/2, 1/4, 1/8 the worst is {', '.join(f'{one:.2g}' for one in worst)} % off,"
+            f" 1, 1/2, 1/4, 1/8 the worst is {', '.join(f'{error:.2g}' for error in worst)} % off,"
             f" orders {', '.join(f'{order:.2f}' for order in orders)}",
         )
     ]
@@ -156,7 +156,7 @@ def physics(bench: Bench, count: int = COUNT) -> list[Measure]:
     parameters = Parameters.of(sling.law, thetas)
     done = launch(sling, setup, parameters, draws, device=bench.device, workers=bench.workers)
     state = zip(done.separation_y, done.separation_z, done.speed, done.angle, strict=True)
-    flights = [_flight(*one, -setup.fork_height) for one in state]
+    flights = [_flight(*row, -setup.fork_height) for row in state]
     shares = []
     for k, draw in enumerate(draws):
         theta = parameters[[k]]

@@ -196,7 +196,7 @@ class ReferenceRod:
         free = self.uniaxial(stretch, -1) - self.uniaxial(q, -1) - retained * (stretch - q)
         lost = overstress * (stretch - q) / TIMES
         volume = self.branch * self.sling.area * self.sling.edge_lengths
-        return tuple((one.sum(-1) * volume).sum(-1) for one in (free, lost))
+        return tuple((density.sum(-1) * volume).sum(-1) for density in (free, lost))
 
     def viscous_stress(self, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
         """d times the rate of the nominal stress at state `at`, shape part scaled by s, times A.

@@ -118,20 +118,20 @@ def section(
     def summary(reasons: dict) -> str:
         return "; ".join(f"{number} “{reason}”" for reason, number in reasons.items()) or "none"
 
-    def failed(name: str, one: dict) -> Measure:
-        total = float(sum(one["reasons"].values()))
-        return Measure(name, "—", total, "θ", None, summary(one["reasons"]))
+    def failed(name: str, counts: dict) -> Measure:
+        total = float(sum(counts["reasons"].values()))
+        return Measure(name, "—", total, "θ", None, summary(counts["reasons"]))
 
     boundary = [
         Measure(
-            f"unconverged, and marked so, of {one['rollouts']} rollouts {where}, held fast",
+            f"unconverged, and marked so, of {counts['rollouts']} rollouts {where}, held fast",
             "0",
-            float(len(one["unconverged"])),
+            float(len(counts["unconverged"])),
             "θ",
             0.0,
-            ranges(one["unconverged"]) if one["unconverged"] else "",
+            ranges(counts["unconverged"]) if counts["unconverged"] else "",
         )
-        for where, one in (
+        for where, counts in (
             ("at the corners of the box", edges["corners"]),
             ("on its faces, one parameter at a bound", edges["faces"]),
         )
@@ -142,7 +142,7 @@ def section(
             f" corners and {faces} on faces of the box, {launches} with the default grip and"
             f" {launches} launches",
             "0",
-            float(sum(one["not_finite"] for one in surveys.values())),
+            float(sum(counts["not_finite"] for counts in surveys.values())),
             "θ",
             0.0,
             f"farthest node {held['farthest_node_m']:.2f} m from the fork",

@@ -54,7 +54,7 @@ def rubber_of(bench: Bench) -> ClampedBand:
     return replace(band_of(bench), law=RUBBER)
 
 
-def own(
+def law_parameters(
     shape: tuple[float, float] = SHAPE,
     relaxation: float = RELAXATION,
     softening: float = SOFTENING,
@@ -72,11 +72,11 @@ def _string(bench: Bench, lighter: float = 1.0) -> ClampedBand:
 
 
 def drawn_across(
-    bench: Bench, sling: ClampedBand, stretch: np.ndarray, times: np.ndarray, **own: float
+    bench: Bench, sling: ClampedBand, stretch: np.ndarray, times: np.ndarray, **law_values: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pull along the band [N] over A mu as its middle is drawn to stretches (T,), and the times."""
     young = 1e6
-    theta = Parameters.of(RUBBER, [young, FULL, 2e-4, 0.5, 1.0], **own)
+    theta = Parameters.of(RUBBER, [young, FULL, 2e-4, 0.5, 1.0], **law_values)
     depth = sling.rest_length / 2 * np.sqrt(np.maximum(stretch**2 - 1, 0))
     table = steps(times, np.diff(times)[0], grip=Grip.POUCH)
     table["target"][:, 1] = -depth[1:]
@@ -94,7 +94,7 @@ def pull(bench: Bench, stretches=(1.2, 1.6, 2.2), shapes=SHAPES) -> list[Measure
         for stretch in stretches:
             path = np.append(np.linspace(1.001, stretch, 40), [stretch] * 20)
             got, _ = drawn_across(
-                bench, sling, path, 10.0 * np.arange(len(path)), **own(shape, 0.0)
+                bench, sling, path, 10.0 * np.arange(len(path)), **law_parameters(shape, 0.0)
             )
             worst = max(worst, off(got[-1], stress(stretch, shape)))
     return [
@@ -116,7 +116,7 @@ def cycle(bench: Bench, most: float = 1.8, softening: float = SOFTENING) -> list
     turns = np.array([1.001, most, 1.3, most + 0.2])
     path = np.concatenate([np.linspace(a, b, 120) for a, b in zip(turns, turns[1:], strict=False)])
     times = 10.0 * np.arange(len(path))
-    got, _ = drawn_across(bench, sling, path, times, **own(shape, 0.0, softening))
+    got, _ = drawn_across(bench, sling, path, times, **law_parameters(shape, 0.0, softening))
     path, worst = path[1:], np.maximum.accumulate(path)[1:]
     left = [left_of(*pair, shape, softening) for pair in zip(path, worst, strict=True)]
     summary, taut = stress(path, shape) * left, path > 1.05
@@ -143,7 +143,7 @@ def relaxation(bench: Bench, shape=SHAPE, most: float = 1.6) -> list[Measure]:
     for name, (history, end, first) in histories.items():
         times = np.append(np.linspace(0, 0.25, 251), np.linspace(0.252, end, 400))
         stretch = np.maximum(history(times), 1.0)
-        beside = own(shape, softening=0.0)
+        beside = law_parameters(shape, softening=0.0)
         got, at = drawn_across(bench, _string(bench, 10.0), stretch, times, **beside)
         chosen = np.flatnonzero((at > first) & (stretch[1:] > 1.05))[::40]
         summary = np.array([integral(history, at[k], shape, RELAXATION) for k in chosen])
@@ -167,7 +167,7 @@ def oscillator(bench: Bench, shape=SHAPE, stretch: float = 1.5) -> list[Measure]
     mass, theta = 0.5, [1e6, FULL, 1e-6, 0.5, 0.0]
     sling, options = (
         rubber_of(bench),
-        {"mass": mass, "stretch": stretch, **own(shape, softening=0.0)},
+        {"mass": mass, "stretch": stretch, **law_parameters(shape, softening=0.0)},
     )
     time, place, _, _ = oscillate(bench, theta, sling=sling, **options)
     thin = replace(sling, radius=sling.radius / STRING, mass=sling.mass / 20)
@@ -193,12 +193,14 @@ def oscillator(bench: Bench, shape=SHAPE, stretch: float = 1.5) -> list[Measure]
     checks = []
     against = "m x'' + k (x + w Σ o) = 0, o' = x' − o/t, by the matrix exponential"
     both = zip(modes(place), modes(np.array(summary)), strict=True)
-    for (name, limit, unit), (one, other) in zip(
+    for (name, limit, unit), (estimate, other) in zip(
         (("frequency", FREQUENCY_LIMIT, "Hz"), ("decay", DECAY_LIMIT, "/s")), both, strict=True
     ):
-        note = f"{one:.4g} {unit}, closed form {other:.4g} {unit}; both as one damped oscillation"
+        note = (
+            f"{estimate:.4g} {unit}, closed form {other:.4g} {unit}; both as one damped oscillation"
+        )
         where = f"{name} of a heavy middle, damped by relaxation alone"
-        checks.append(Measure(where, against, off(one, other), "%", limit, note))
+        checks.append(Measure(where, against, off(estimate, other), "%", limit, note))
     return checks
 
 
@@ -210,7 +212,7 @@ def growth(bench: Bench, count: int = 16, kinds=tuple(STATES)) -> list[Measure]:
         starts = random_states(band_of(bench), kind, count, rng)
         for theta, start in zip(thetas, starts, strict=True):
             shape = rng.uniform(-0.3, 0.9), rng.uniform(0, 0.3)
-            beside = own(shape, rng.uniform(0, 0.1), rng.uniform(0, 0.6))
+            beside = law_parameters(shape, rng.uniform(0, 0.1), rng.uniform(0, 0.6))
             parameters = Parameters.of(RUBBER, theta, **beside)
             sling = rubber_of(bench)
             sling = straight(sling, sling.rest_length)
@@ -242,7 +244,7 @@ def slack(bench: Bench) -> list[Measure]:
     It is longer than it was; it bends out and grows short again.
     """
     sling = rubber_of(bench)
-    theta = Parameters.of(RUBBER, [3e5, 0.45, 1e-3, 0.5, 0.5], **own(relaxation=0.1))
+    theta = Parameters.of(RUBBER, [3e5, 0.45, 1e-3, 0.5, 0.5], **law_parameters(relaxation=0.1))
     sling = straight(sling, sling.rest_length)
     out, back = np.linspace(0.01, 1, 100), 30 + np.linspace(0.005, 0.5, 100)
     later = np.linspace(1.1, 30, 40), 30.5 + np.linspace(0.05, 60, 200)
@@ -268,7 +270,7 @@ def slack(bench: Bench) -> list[Measure]:
 def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Measure]:
     """`launch` starts with what a pull and a pause leave in the memory: the march of that pull."""
     sling, draw = rubber_of(bench), np.array([-0.35, -0.15])
-    theta = Parameters.of(RUBBER, theta, **own())
+    theta = Parameters.of(RUBBER, theta, **law_parameters())
     setup = setup_of(bench, history=HISTORY)
     done = launching.launch(sling, setup, theta, draw, device=bench.device)
     none = launching.launch(sling, setup_of(bench), theta, draw, device=bench.device)
@@ -315,33 +317,33 @@ def random_points(bench: Bench, count: int) -> Parameters:
 
 def survey(bench: Bench, count: int = 10_000, progress=print) -> tuple[list[Measure], dict]:
     sling = replace(rubber_of(bench), grip_force=robustness.HELD_FAST)
-    found = robustness.survey(bench, sling, random_points(bench, count), progress)
+    counts = robustness.survey(bench, sling, random_points(bench, count), progress)
     names = parameter_names(RUBBER)
-    failed = robustness.ranges(found["unconverged"], names) if found["unconverged"] else ""
+    failed = robustness.ranges(counts["unconverged"], names) if counts["unconverged"] else ""
     return [
         Measure(
             f"not finite, though not marked failed, of {count} random points, negative shares among"
             " them",
             "0",
-            float(found["not_finite"]),
+            float(counts["not_finite"]),
             "θ",
             0.0,
         ),
         Measure(
             f"unconverged, and marked so, of {count} random points, held fast",
             "0, or marked failed with a reason",
-            float(len(found["unconverged"])),
+            float(len(counts["unconverged"])),
             "θ",
             robustness.ALLOWED * count / robustness.COUNT,
             failed,
         ),
-    ], found
+    ], counts
 
 
 def section(bench: Bench, count: int = 10_000, progress=print) -> Theme:
     sling = rubber_of(bench)
-    balance = energy.balance(bench, sling=sling, **own())
-    surveyed, found = survey(bench, count, progress)
+    balance = energy.balance(bench, sling=sling, **law_parameters())
+    surveyed, counts = survey(bench, count, progress)
     return Theme(
         "The law `rubber`",
         [
@@ -349,16 +351,18 @@ def section(bench: Bench, count: int = 10_000, progress=print) -> Theme:
             *cycle(bench),
             *relaxation(bench),
             *oscillator(bench),
-            *agreement.checks(bench, 2, sling=sling, **own()),
+            *agreement.checks(bench, 2, sling=sling, **law_parameters()),
             *energy.checks(balance),
             *growth(bench),
             *slack(bench),
             *histories(bench),
-            *launching.convergence(bench, progress=progress, sling=sling, history=HISTORY, **own()),
+            *launching.convergence(
+                bench, progress=progress, sling=sling, history=HISTORY, **law_parameters()
+            ),
             *surveyed,
         ],
         "Mooney's share m, the upturn c, softening s and eight relaxing branches beside the"
         " neo-Hookean material (`pipeline/simulator/rubber.h`). E is the modulus after ten seconds."
         " Softening and each branch have a free energy; what they lose takes part in the balance.",
-        details={"survey": found},
+        details={"survey": counts},
     )

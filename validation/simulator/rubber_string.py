@@ -25,7 +25,7 @@ def slope(stretch: float, shape: tuple[float, float]) -> float:
 
 def left_of(stretch: float, most: float, shape: tuple[float, float], softening: float) -> float:
     """Share of `stress` that is left after a stretch of `most`, by works that are integrated."""
-    done, worst = (quad(stress, 1, one, args=(shape,))[0] for one in (stretch, most))
+    done, worst = (quad(stress, 1, end, args=(shape,))[0] for end in (stretch, most))
     gap = 1 - done / worst
     return 1 - 2.05 * softening * gap**2 / (gap**2 + gap + 0.05)
 
@@ -52,6 +52,6 @@ def integral(
     def kernel(then: float) -> float:
         return rate(then) * np.exp((then - time) / TIMES).sum()
 
-    corners = [one for one in (0.2, 0.5) if one < time]
+    corners = [corner for corner in (0.2, 0.5) if corner < time]
     added = quad(kernel, 0, time, points=corners, limit=400, epsabs=1e-7)[0]
     return left * (stress(history(time), shape) + weight * added)

@@ -105,12 +105,12 @@ def verify(
         for picture in sorted(Path(figures).glob("*.png")):
             with replacing(root / "reports" / name / picture.name) as temporary:
                 temporary.write_bytes(picture.read_bytes())
-    scripts = [Path(inspect.getfile(one)) for one in (verify, *(extra or {}).values())]
-    known = environment(device, f"sling verify --device {device}", *scripts)
+    scripts = [Path(inspect.getfile(function)) for function in (verify, *(extra or {}).values())]
+    provenance = environment(device, f"sling verify --device {device}", *scripts)
     retained = ("device", "simulator", "code") + (() if device == "cpu" else ("device_name",))
-    about = {name: known[name] for name in retained}
-    write_text(root / f"reports/{name}.md", markdown(sections, about, name))
-    write_json(root / f"reports/{name}.json", about | {"sections": list(map(_entry, sections))})
+    context = {name: provenance[name] for name in retained}
+    write_text(root / f"reports/{name}.md", markdown(sections, context, name))
+    write_json(root / f"reports/{name}.json", context | {"sections": list(map(_entry, sections))})
     return sections
 
 
@@ -127,7 +127,7 @@ def summary(sections: list[Theme]) -> tuple[str, int]:
     return "\n".join(lines), len(missed)
 
 
-def markdown(sections: list[Theme], about: dict, name: str) -> str:
+def markdown(sections: list[Theme], context: dict, name: str) -> str:
     """The whole page; `name` is that of its pictures' folder and of the JSON beside it."""
     checks = [check for section in sections for check in section.checks]
     missed, limited = len(unmet(checks)), sum(check.met is not None for check in checks)
@@ -136,8 +136,8 @@ def markdown(sections: list[Theme], about: dict, name: str) -> str:
         limited=limited,
         missed=f", {missed} not" if missed else "",
         name=name,
-        device=", ".join(filter(None, (about["device"], about.get("device_name")))),
-        simulator=about["simulator"],
+        device=", ".join(filter(None, (context["device"], context.get("device_name")))),
+        simulator=context["simulator"],
     )
     return "\n".join([head, *(_part(section, name) for section in sections)])
 

@@ -24,7 +24,11 @@ CHECKS = {
     "torsion": lambda bench: at_rest.torsion(bench, (0.45,)),
     "the kernel's steps": lambda bench: agreement.checks(bench, count=2),
     "half-braked turns": lambda bench: agreement.checks(
-        bench, 1, sling=rubber.rubber_of(bench), turn_damping=0.5, **rubber.own((0.5, 0.1), 0.04)
+        bench,
+        1,
+        sling=rubber.rubber_of(bench),
+        turn_damping=0.5,
+        **rubber.law_parameters((0.5, 0.1), 0.04),
     ),
     "growth of energy": lambda bench: damping.growth(bench, count=16),
     "a heavy middle": lambda bench: damping.oscillator(bench, OSCILLATORS),
@@ -41,14 +45,14 @@ CHECKS = {
     "rubber: relaxation": rubber.relaxation,
     "rubber: a heavy middle": rubber.oscillator,
     "rubber: the kernel's steps": lambda bench: agreement.checks(
-        bench, 1, sling=rubber.rubber_of(bench), **rubber.own((-0.3, 0.2), 0.08)
+        bench, 1, sling=rubber.rubber_of(bench), **rubber.law_parameters((-0.3, 0.2), 0.08)
     ),
     "rubber: growth of energy": lambda bench: rubber.growth(bench, 4),
     "rubber: slack again": rubber.slack,
     "rubber: a launch's history": rubber.histories,
     "rubber: random points": lambda bench: rubber.survey(bench, 64, progress=str)[0],
     "rubber: energy": lambda bench: energy.checks(
-        energy.balance(bench, sling=rubber.rubber_of(bench), **rubber.own())
+        energy.balance(bench, sling=rubber.rubber_of(bench), **rubber.law_parameters())
     ),
 }
 

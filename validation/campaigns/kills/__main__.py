@@ -59,22 +59,22 @@ def undisturbed(work: Path) -> dict[str, dict]:
 
 
 def _undisturbed(work: Path) -> dict[str, dict]:
-    found = {}
+    results = {}
     for kind in (ReproCopy, FitCopy):
         copy = kind(work / "undisturbed" / kind.name.replace(" ", "-"), work)
         copy.begin()
         begun, start = compare.contents(copy.folder), time.monotonic()
         copy(*copy.words)
-        found[kind.name] = {
+        results[kind.name] = {
             "seconds": round(time.monotonic() - start, 1),
             "begun": begun,
             "files": compare.contents(copy.folder),
             "locks": compare.locked(copy.folder),
         }
-        say(f"undisturbed {kind.name}: {found[kind.name]['seconds']:.0f} s")
+        say(f"undisturbed {kind.name}: {results[kind.name]['seconds']:.0f} s")
         if kind is ReproCopy:
             shutil.copy(copy.folder / "data/raw/band1/band1.mcap", work / RECORDING)
-    return found
+    return results
 
 
 def say(line: str) -> None:
@@ -84,7 +84,7 @@ def say(line: str) -> None:
 def ended(copy: StruckCopy, expected: dict) -> dict[str, bool]:
     """At the end of a round: how what is there compares with the undisturbed run's."""
     copies = copy.copies
-    caches = [one / ".dvc/cache" for one in copies] + [copy.disk / "remote"]
+    caches = [folder / ".dvc/cache" for folder in copies] + [copy.disk / "remote"]
     fresh = copy("dvc", "status", *copy.stages)
     return {
         "files": compare.contents(copy.folder) == expected["files"],
@@ -115,33 +115,35 @@ def disturb(
         if not going and not (before and not before[-1]["ended"] and copy.folder.is_dir()):
             copy.begin()
         going = True
-        one = attempt(len(before), wanted - count)
+        result = attempt(len(before), wanted - count)
         wholes = (expected["files"], expected["begun"])
         for folder in copy.copies:
             if halves := compare.halves(folder, *wholes):
-                one["faults"].append(f"neither as before nor as in the end: {halves[:5]}")
-        one["mended"] = copy.mend()
-        one["ended"] = one["status"] == 0
-        lines.add({"what": "attempt", "name": name, "by": by, **one})
-        count += disturbances(one)
+                result["faults"].append(f"neither as before nor as in the end: {halves[:5]}")
+        result["mended"] = copy.mend()
+        result["ended"] = result["status"] == 0
+        lines.add({"what": "attempt", "name": name, "by": by, **result})
+        count += disturbances(result)
         summary = (
-            [kill["hit"] for kill in one.get("kills", ())] or one.get("said") or "not disturbed"
+            [kill["hit"] for kill in result.get("kills", ())]
+            or result.get("said")
+            or "not disturbed"
         )
-        say(f"{name}, {by} {count} of {wanted}: {one['seconds']:.0f} s, {summary}")
-        for fault in one["faults"]:
+        say(f"{name}, {by} {count} of {wanted}: {result['seconds']:.0f} s, {summary}")
+        for fault in result["faults"]:
             say(f"  fault: {fault}")
-        if one["ended"]:
+        if result["ended"]:
             same = ended(copy, expected)
             left = {
                 "temporaries": [file for here in copy.copies for file in compare.temporaries(here)],
                 "left_in_tmp": sorted(file.name for file in (copy.place / "tmp").iterdir()),
             }
-            about = {"what": "round", "name": name, "by": by, "after": count}
-            lines.add({**about, **same, **left})
+            row = {"what": "round", "name": name, "by": by, "after": count}
+            lines.add({**row, **same, **left})
             say(f"{name}, {by}: whole after {count}: {same}")
             going = False
-        elif not disturbances(one) and one["faults"]:
-            raise UserError(f"{name} fails though nothing disturbs it: {one['faults'][-1]}")
+        elif not disturbances(result) and result["faults"]:
+            raise UserError(f"{name} fails though nothing disturbs it: {result['faults'][-1]}")
 
 
 def disturbances(attempt: dict) -> int:
@@ -188,13 +190,13 @@ def report(lines: ResultLines, kills: int, disks: int, expected: dict, names: li
         }
         for name in names
     }
-    killed, filled = (sum(one[by] for one in done.values()) for by in ("kill", "full disk"))
+    killed, filled = (sum(counts[by] for counts in done.values()) for by in ("kill", "full disk"))
     faults = [
         {"name": attempt["name"], "by": attempt["by"], "fault": fault}
         for attempt in attempts
         for fault in attempt["faults"]
     ]
-    same = all(one[check] for one in rounds for check in CHECKS)
+    same = all(line[check] for line in rounds for check in CHECKS)
     complete = killed >= kills and filled >= disks and all(
         (whole := lines.where(what="round", name=name, by=by))
         and whole[-1]["after"] == done[name][by]
@@ -223,11 +225,11 @@ def report(lines: ResultLines, kills: int, disks: int, expected: dict, names: li
             "half_lock_files_cut_back": sum(attempt["mended"] for attempt in attempts),
             "attempts": len(attempts),
             "seconds": round(sum(attempt["seconds"] for attempt in attempts), 1),
-            "undisturbed_s": {name: one["seconds"] for name, one in expected.items()},
-            "files": {name: len(one["files"]) for name, one in expected.items()},
-            "stages": {name: len(one["locks"]) for name, one in expected.items()},
+            "undisturbed_s": {name: run["seconds"] for name, run in expected.items()},
+            "files": {name: len(run["files"]) for name, run in expected.items()},
+            "stages": {name: len(run["locks"]) for name, run in expected.items()},
             "rounds": rounds,
-            "left_in_tmp": sorted({one for some in rounds for one in some["left_in_tmp"]}),
+            "left_in_tmp": sorted({file for some in rounds for file in some["left_in_tmp"]}),
             "said_of_full_disks": dict(
                 Counter(attempt["said"] for attempt in attempts if attempt.get("said"))
             ),
@@ -246,8 +248,8 @@ def main() -> int:
     arguments = options.parse_args()
     work, names = arguments.work.resolve(), arguments.commands
     work.mkdir(parents=True, exist_ok=True)
-    for one in orphans(work):
-        send(one)
+    for process in orphans(work):
+        send(process)
     project = source(work)
     lines, expected = ResultLines(work / "results.jsonl"), undisturbed(work)
     todo = {
@@ -261,20 +263,20 @@ def main() -> int:
             for name in names
             if wanted[name]
         ]
-        for one in requested:
-            one.result()
+        for task in requested:
+            task.result()
     content = report(lines, arguments.kills, arguments.full_disks, expected, names)
-    for one in content["figures"]["faults"]:  # wherever it ran
-        one["fault"] = one["fault"].replace(str(work), "WORK")
+    for fault in content["figures"]["faults"]:  # wherever it ran
+        fault["fault"] = fault["fault"].replace(str(work), "WORK")
     command = f"python -m validation.campaigns.kills --kills {arguments.kills}"
     command += f" --full-disks {arguments.full_disks}"
     ran = [project / "app/cli.py", *sorted((project / "stages").glob("[a-z]*.py"))]
-    about = environment("cpu", command) | {
+    provenance = environment("cpu", command) | {
         "commit": json.loads((work / "source.json").read_text())["commit"],
         "simulator": fingerprint(project / "pipeline/simulator")[:12],
         "code": digests(project / Path(__file__).relative_to(ROOT), *ran, root=project),
     }
-    write_json(arguments.report, content | about)
+    write_json(arguments.report, content | provenance)
     say(f"{'met' if content['met'] else 'NOT met'}: {arguments.report}")
     return 0 if content["met"] else 1
 

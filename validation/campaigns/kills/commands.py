@@ -109,12 +109,12 @@ class StruckCopy(ProjectCopy):
     def left(self, seconds: float) -> list[str]:
         """Commands of what lives still after so long, services apart; it is ended then."""
         apart = {service.pid for service in self.services}
-        alive = lambda: [one for one in self.run.alive() if one.pid not in apart]  # noqa: E731
+        alive = lambda: [process for process in self.run.alive() if process.pid not in apart]  # noqa: E731
         wait(lambda: not alive(), seconds)
-        found = alive()
-        message = [" ".join(one.cmdline()) for one in found if one.is_running()]
-        for one in found:
-            send(one)
+        survivors = alive()
+        message = [" ".join(process.cmdline()) for process in survivors if process.is_running()]
+        for process in survivors:
+            send(process)
         return message
 
     def mend(self) -> bool:
@@ -187,7 +187,9 @@ class ClusterCopy(StruckCopy):
 
     @property
     def services(self) -> list[psutil.Process]:
-        return [psutil.Process(one.pid) for one in self._dask.values() if one.poll() is None]
+        return [
+            psutil.Process(process.pid) for process in self._dask.values() if process.poll() is None
+        ]
 
     def begin(self) -> None:
         self.end()
@@ -226,9 +228,9 @@ class ClusterCopy(StruckCopy):
                 start_new_session=True,
             )
         address = re.compile(rf"{says}: +(tcp://\S+)")
-        if not (found := wait(lambda: address.search(log.read_text()), STARTED)):
+        if not (match := wait(lambda: address.search(log.read_text()), STARTED)):
             raise RuntimeError(f"Dask's {name} does not start: {log.read_text()[-500:]}")
-        return found[1]
+        return match[1]
 
     def _end(self, name: str) -> None:
         if self._lives(name):
@@ -240,7 +242,7 @@ class ClusterCopy(StruckCopy):
             self._end(name)
 
 
-COMMANDS = {one.name: one for one in (ReproCopy, FlowCopy, FitCopy, ClusterCopy)}
+COMMANDS = {command.name: command for command in (ReproCopy, FlowCopy, FitCopy, ClusterCopy)}
 
 
 def orphans(work: Path) -> list[psutil.Process]:

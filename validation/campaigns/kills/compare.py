@@ -29,14 +29,18 @@ def contents(folder: Path) -> dict[str, str]:
 
     DVC's own, Git's, Python's and Prefect's files and what searches keep do not count.
     """
-    found = {}
+    digests = {}
     for at, folders, names in os.walk(folder):
-        folders[:] = [one for one in folders if not (one in PASSING or one.endswith(".tmp"))]
+        folders[:] = [
+            subfolder
+            for subfolder in folders
+            if not (subfolder in PASSING or subfolder.endswith(".tmp"))
+        ]
         for name in names:
             if name not in ELSEWHERE and not name.endswith(".tmp"):
                 file = Path(at, name)
-                found[file.relative_to(folder).as_posix()] = _digest(file)
-    return found
+                digests[file.relative_to(folder).as_posix()] = _digest(file)
+    return digests
 
 
 def _digest(file: Path) -> str:
@@ -47,7 +51,7 @@ def locked(folder: Path) -> dict[str, dict[str, str]]:
     """Digests of outputs and inputs in dvc.lock, by stage."""
     stages = YAML(typ="safe").load(folder / "dvc.lock")["stages"]
     return {
-        name: {one["path"]: one["md5"] for kind in ("deps", "outs") for one in entry[kind]}
+        name: {file["path"]: file["md5"] for kind in ("deps", "outs") for file in entry[kind]}
         for name, entry in stages.items()
     }
 
@@ -68,11 +72,11 @@ def temporaries(folder: Path) -> list[str]:
 
 def broken(folder: Path) -> list[str]:
     """Files of DVC's cache, or of a remote, that are not what their name says."""
-    found = []
+    files = []
     for file in folder.glob("files/md5/*/*"):
         if file.is_file() and file.parent.name + file.name.removesuffix(".dir") != _digest(file):
-            found.append(str(file.relative_to(folder)))
-    return found
+            files.append(str(file.relative_to(folder)))
+    return files
 
 
 def held(folder: Path) -> list[str]:
@@ -80,7 +84,7 @@ def held(folder: Path) -> list[str]:
 
     What a process that has ended held DVC forgets by itself.
     """
-    found = []
+    locks = []
     for name in LOCKS:
         path = folder / name
         if not path.is_file():
@@ -89,15 +93,15 @@ def held(folder: Path) -> list[str]:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                found.append(name)
+                locks.append(name)
     rwlock = folder / ".dvc/tmp/rwlock"
     if rwlock.is_file():
         try:
             content = json.loads(rwlock.read_text(encoding="utf-8"))
             holders = [*content.get("write", {}).values()]
-            holders += [one for some in content.get("read", {}).values() for one in some]
+            holders += [holder for some in content.get("read", {}).values() for holder in some]
             lives = any(psutil.pid_exists(holder["pid"]) for holder in holders)
         except (ValueError, AttributeError, TypeError, KeyError):
             lives = True
-        found += [".dvc/tmp/rwlock"] if lives else []
-    return found
+        locks += [".dvc/tmp/rwlock"] if lives else []
+    return locks

@@ -82,7 +82,7 @@ def filled(copy: StruckCopy, number: int, seed: int, full: bool) -> dict:
         faults.append(f"lives {PROMPT:g} s later: {left}")
     ballast.unlink(missing_ok=True)
     message = copy.run.message
-    lines = [one for one in message.splitlines() if any(what in one for what in SAYS)]
+    lines = [line for line in message.splitlines() if any(what in line for what in SAYS)]
     if status and (since is None or not lines or "Traceback" in message):
         faults.append(f"status {status}: {message[-1500:]}")
     return {

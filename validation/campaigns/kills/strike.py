@@ -47,7 +47,11 @@ def strike(
     if victim == "command":
         command.kill()
         return "the command"
-    others = [one for one in run.alive() if one.pid != command.pid and kind(command_line(one))]
+    others = [
+        process
+        for process in run.alive()
+        if process.pid != command.pid and kind(command_line(process))
+    ]
     if not others:
         return None
     hit = others[rng.integers(len(others))]

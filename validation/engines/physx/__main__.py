@@ -19,19 +19,19 @@ DEVICE = "cuda:0"
 def main() -> None:
     """Compare, time, write. Raises UserError."""
     version = bands.release()
-    about = environment(DEVICE, "python -m validation.engines.physx")
+    provenance = environment(DEVICE, "python -m validation.engines.physx")
     bench = Bench(load(), device=DEVICE)
     with bands.Engine() as engine:
         speeds = study.speeds(bench, engine)
         checks = study.pulls(bench, engine)
-    about["versions"] |= {"ovphysx": version}
+    provenance["versions"] |= {"ovphysx": version}
     content = {
         "asked": study.ASK,
         "met": not unmet(checks) and study.fast_enough(speeds),
         "checks": [_plain(check) for check in checks],
         "speeds": speeds,
     }
-    write_json(REPORT, content | about)
+    write_json(REPORT, content | provenance)
 
 
 def _plain(check: Measure) -> dict:

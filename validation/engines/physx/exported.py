@@ -129,10 +129,10 @@ class ExportedBand:
 
 def _value(text: str, name: str):
     """What a property of the stage is set to. Raises ValueError."""
-    found = re.search(rf"^\s*(?:uniform )?{re.escape(name)} = (.+)$", text, re.MULTILINE)
-    if not found:
+    match = re.search(rf"^\s*(?:uniform )?{re.escape(name)} = (.+)$", text, re.MULTILINE)
+    if not match:
         raise ValueError(f"has no {name}")
-    return ast.literal_eval(found[1].strip())
+    return ast.literal_eval(match[1].strip())
 
 
 def yielded(draw: np.ndarray, force: float, stiffness: float | None) -> np.ndarray:
@@ -144,8 +144,8 @@ def yielded(draw: np.ndarray, force: float, stiffness: float | None) -> np.ndarr
 def compared(band: ExportedBand, launches: list[dict], stiffness, engine) -> list[dict]:
     """Each draw of the calibrated simulation, held in PhysX."""
     rows = []
-    for one in launches:
-        draw, ours = np.array(one["draw_m"]), one["hold_force_n"]
+    for launch in launches:
+        draw, ours = np.array(launch["draw_m"]), launch["hold_force_n"]
         force, gone = band.held(engine, yielded(draw, ours, stiffness))
         sound = bool(np.isfinite(force))
         rows.append(
@@ -182,16 +182,16 @@ def main() -> None:
             raise UserError(f"{card.parent}: no export; `sling export` writes it")
     card = json.loads(cards[0].read_text())
     name = card["band"]
-    about = environment("cuda:0", "python -m validation.engines.physx.exported USD YAML")
-    about["versions"] |= {"ovphysx": version}
+    provenance = environment("cuda:0", "python -m validation.engines.physx.exported USD YAML")
+    provenance["versions"] |= {"ovphysx": version}
     launches = YAML(typ="safe").load(requested.yaml / f"{name}.yaml")["launches"]
     band, stiffness = ExportedBand.read(requested.usd / f"{name}.usda"), load().setup.arm_stiffness
     with Engine() as engine:
         rows = compared(band, launches, stiffness, engine)
     content = {"asked": ASKED, "met": met(rows), "band": name, "matched": card["matched"]}
-    write_json(REPORT, content | {"draws": rows} | about)
+    write_json(REPORT, content | {"draws": rows} | provenance)
     errors_there = [row["hold_force_error"] for row in rows]
-    worst = max((np.inf if one is None else abs(one) for one in errors_there), default=np.nan)
+    worst = max((np.inf if error is None else abs(error) for error in errors_there), default=np.nan)
     print(f"{REPORT}: {len(rows)} draws, held force off by at most {100 * worst:.1f} %")
 
 

@@ -112,7 +112,7 @@ def main() -> None:
     done = theirs.launches
     columns = *draws.T, ours.landing_y, done.landing_y, ours.hold_force, done.hold_force
     for *row, why in zip(*columns, theirs.gained, done.failure, strict=True):
-        print(*(f"{one:9.3f}" for one in row), f" {why or ''}")
+        print(*(f"{number:9.3f}" for number in row), f" {why or ''}")
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ def lame(young, poisson) -> tuple:
 
 def stress(gradient: np.ndarray, young, poisson) -> np.ndarray:
     """Nominal stress P [Pa] at deformation gradients (..., 3, 3); the moduli fit (...)."""
-    mu, lam = (np.asarray(one)[..., None, None] for one in lame(young, poisson))
+    mu, lam = (np.asarray(modulus)[..., None, None] for modulus in lame(young, poisson))
     off, volume, cofactor = _strain(gradient)
     return 2 * mu * off + lam * (volume - 1) * cofactor
 
@@ -40,10 +40,10 @@ def viscous(before: np.ndarray, gradient: np.ndarray, delay, young, poisson) -> 
     Args:
         delay: The damping d over the step's duration; fits (...), as the moduli do.
     """
-    mu, delay = (np.asarray(one)[..., None, None] for one in (lame(young, poisson)[0], delay))
+    mu, delay = (np.asarray(factor)[..., None, None] for factor in (lame(young, poisson)[0], delay))
     (off, volume, cofactor), (off_before, volume_before, _) = map(_strain, (gradient, before))
     size, size_before = (
-        np.linalg.norm(one, axis=(-2, -1), keepdims=True) for one in (off, off_before)
+        np.linalg.norm(strain, axis=(-2, -1), keepdims=True) for strain in (off, off_before)
     )
     along = off / np.maximum(size, 1e-12)
     return 2 * mu * delay * ((size - size_before) * along + (volume - volume_before) * cofactor)
@@ -51,7 +51,7 @@ def viscous(before: np.ndarray, gradient: np.ndarray, delay, young, poisson) -> 
 
 def energy(tube: Tube, positions: np.ndarray, young, poisson) -> np.ndarray:
     """Elastic energy of bands at positions (..., sections, V, 3) [J], shape (...)."""
-    mu, lam = (np.asarray(one)[..., None] for one in lame(young, poisson))
+    mu, lam = (np.asarray(modulus)[..., None] for modulus in lame(young, poisson))
     before, gradient = _gradients(tube, tube.tetrahedra, positions)
     off, volume, _ = _strain(gradient)
     density = mu * (off**2).sum(axis=(-2, -1)) + lam / 2 * (volume[..., 0, 0] - 1) ** 2
@@ -77,7 +77,7 @@ def force_on(
     near = tube.tetrahedra[held.ravel()[tube.tetrahedra].any(axis=1)]
     before, gradient = _gradients(tube, near, positions)
     inverse = np.linalg.inv(before)
-    moduli = [np.asarray(one)[..., None] for one in (young, poisson)]
+    moduli = [np.asarray(modulus)[..., None] for modulus in (young, poisson)]
     nominal = stress(gradient, *moduli)
     if step is not None:
         earlier, delay = step

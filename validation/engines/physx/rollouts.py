@@ -78,9 +78,9 @@ def _between(arc: np.ndarray, places: np.ndarray, lines: np.ndarray) -> np.ndarr
     return _at(arc, places, lines.swapaxes(0, 1)).swapaxes(0, 1)
 
 
-def _at(wanted: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values (K, ...) at known (K,), interpolated along the first axis; beyond it the outermost."""
-    after = np.searchsorted(known, wanted).clip(1, len(known) - 1)
-    part = ((wanted - known[after - 1]) / (known[after] - known[after - 1])).clip(0, 1)
+def _at(wanted: np.ndarray, places: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (K, ...) at places (K,), interpolated along the first axis; beyond, the outermost."""
+    after = np.searchsorted(places, wanted).clip(1, len(places) - 1)
+    part = ((wanted - places[after - 1]) / (places[after] - places[after - 1])).clip(0, 1)
     part = part.reshape(-1, *[1] * (values.ndim - 1))
     return (1 - part) * values[after - 1] + part * values[after]

@@ -48,7 +48,7 @@ ENGINES = {OURS: OUR_ENGINE, PHYSX: "physx"}
 def with_engines(params):
     """params.yaml with a method for each of ENGINES: the paper's, simulated there."""
     paper = params.methods[METHOD]
-    both = {name: paper.model_copy(update={"engine": one}) for name, one in ENGINES.items()}
+    both = {name: paper.model_copy(update={"engine": engine}) for name, engine in ENGINES.items()}
     return params.model_copy(update={"methods": dict(params.methods.items()) | both})
 
 
@@ -72,22 +72,22 @@ class Comparison:
 
     def losses(self, thetas: np.ndarray) -> dict[str, list[dict]]:
         """Terms of the loss of thetas (N, 5) by engine; None where one failed."""
-        unit, found = self.box.to_unit(thetas), {}
+        unit, rows = self.box.to_unit(thetas), {}
         for engine in (OURS, PHYSX):
             done = service("losses", self.band, engine, self.params, len(unit))(unit)
-            found[engine] = [
+            rows[engine] = [
                 {"total": _plain(done.total[i]), "failure": done.failure[i]}
                 | {name: _plain(done.terms[name][i]) for name in TERMS}
                 for i in range(len(thetas))
             ]
-        return found
+        return rows
 
     def launches(self, thetas: np.ndarray, draws: np.ndarray, measured) -> list[dict]:
         """Where our simulator lands the draws (L, 2) with each theta, and where they landed [m]."""
         landings = np.array(
             [
-                launch(self.sling, self.setup, one, draws).landing_y
-                for one in (Parameters.of(self.sling.law, theta) for theta in thetas)
+                launch(self.sling, self.setup, parameters, draws).landing_y
+                for parameters in (Parameters.of(self.sling.law, theta) for theta in thetas)
             ]
         )
         rows = []
@@ -111,11 +111,11 @@ class Comparison:
         else:
             with Engine() as engine:
                 pushed = launch_in_physx(engine, *both, each, every, rate=rate)
-            done, gained = pushed.launches, [_plain(one) for one in pushed.gained]
+            done, gained = pushed.launches, [_plain(value) for value in pushed.gained]
         columns = {
-            "landing_m": [_plain(one) for one in done.landing_y],
-            "speed_m_per_s": [_plain(one) for one in done.speed],
-            "hold_force_n": [_plain(one) for one in done.hold_force],
+            "landing_m": [_plain(value) for value in done.landing_y],
+            "speed_m_per_s": [_plain(value) for value in done.speed],
+            "hold_force_n": [_plain(value) for value in done.hold_force],
             "energy_gained": gained,
             "failure": done.failure,
         }
@@ -150,7 +150,7 @@ def main() -> None:
     params, version = load(requested.params), release()
     command = f"python -m validation.engines.physx.search {requested.band}"
     command += " --landings CSV" if requested.landings else ""
-    about = environment(devices()[0], command)
+    provenance = environment(devices()[0], command)
     if requested.landings:
         table = pd.read_csv(requested.landings)
         draws, measured = table[["draw_y_m", "draw_z_m"]].to_numpy(), table.landing_y_m
@@ -160,7 +160,7 @@ def main() -> None:
     for name in (OURS, PHYSX):
         history, seconds = comparison.search(name)
         best = history.best()
-        thetas.append([best[one] for one in comparison.box.names])
+        thetas.append([best[parameter] for parameter in comparison.box.names])
         content[name] = {
             "theta": dict(zip(comparison.box.names, thetas[-1], strict=True)),
             "rollouts": len(history.total),
@@ -177,9 +177,9 @@ def main() -> None:
         "settings": {"steps_per_s": RATE, "iterations": ITERATIONS, "tetrahedra": 936},
         "launches_in_our_simulator": comparison.launches(np.array(thetas), draws, measured),
     }
-    about["versions"] |= {"ovphysx": version}
+    provenance["versions"] |= {"ovphysx": version}
     path = Path("reports/validation") / f"physx-{requested.band}.json"
-    write_json(path, content | about)
+    write_json(path, content | provenance)
     done, failures = {}, {}
     for where, rate in ((OURS, RATE), (PHYSX, RATE), (f"{PHYSX}_{FINE}_hz", FINE)):
         try:
@@ -191,7 +191,7 @@ def main() -> None:
             "failed_engines": failures,
             "draws": side_by_side(done, draws, measured),
         }
-        write_json(path, content | about)
+        write_json(path, content | provenance)
 
 
 def _plain(value: float) -> float | None:

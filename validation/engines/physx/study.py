@@ -178,12 +178,12 @@ def pulls(bench: Bench, engine: Engine) -> list[Measure]:
     tube = Tube.of(sling, **checks.SAME_MESH)
     episode = _marked(checks.episode_of(sling))
     theta = {poisson: np.array(checks.THETA) for poisson in POISSON}
-    for poisson, one in theta.items():
-        one[1] = poisson
+    for poisson, values in theta.items():
+        values[1] = poisson
     expected = dict(zip(POISSON, ours(sling, episode, np.array(list(theta.values()))), strict=True))
     hand = episode.position[np.searchsorted(episode.time, episode.release_time)]
     stretch = 2 * np.linalg.norm(sling.tips - hand, axis=1).mean() / sling.rest_length
-    found = []
+    measures = []
     for rate, iterations in SETTINGS:
         size = {"rate": rate, "iterations": iterations}
         course = phases(tube, episode, rate)
@@ -191,13 +191,13 @@ def pulls(bench: Bench, engine: Engine) -> list[Measure]:
         scanned = motions(tube, scan, engine.simulate(tube, scan, course, **size))
         factors = {}
         for nu in POISSON:
-            tried = [m for m, one in zip(scanned, scan, strict=True) if one[1] == nu]
+            tried = [m for m, point in zip(scanned, scan, strict=True) if point[1] == nu]
             factors[nu] = _factor(expected[nu].held, [m.held for m in tried])
             title = f"Poisson's ratio {nu:.2f}, {rate} Hz, {iterations} iterations"
-            found += compared(f"{title}, our modulus", expected[nu], tried[-1], limits=False)
+            measures += compared(f"{title}, our modulus", expected[nu], tried[-1], limits=False)
             law = float(equal_modulus(sling, theta[nu], stretch))
             energy = 100 * energy_left(sling, theta[nu], stretch)
-            found.append(
+            measures.append(
                 Measure(
                     f"factor on Young's modulus that holds as ours, {title}",
                     "our modulus",
@@ -210,15 +210,17 @@ def pulls(bench: Bench, engine: Engine) -> list[Measure]:
         matched = np.array([_scaled(theta[nu], factors[nu]) for nu in POISSON])
         if not np.isfinite(matched).all():
             title = f"force held by some modulus, {rate} Hz, {iterations} iterations"
-            about = f"ours lies outside of what {FACTORS[0]:g} to {FACTORS[-1]:g} of E hold"
-            found.append(Measure(title, "our simulator", np.nan, "", 0.0, about))
+            note = f"ours lies outside of what {FACTORS[0]:g} to {FACTORS[-1]:g} of E hold"
+            measures.append(Measure(title, "our simulator", np.nan, "", 0.0, note))
             continue
         courses = engine.simulate(tube, matched, course, **size)
         left = balance(tube, matched, courses)
         for nu, motion, rest in zip(POISSON, motions(tube, matched, courses), left, strict=True):
             title = f"Poisson's ratio {nu:.2f}, {rate} Hz, {iterations} iterations, modulus matched"
-            found += compared(title, expected[nu], motion, limits=(rate, iterations) == SETTINGS[0])
-            found.append(
+            measures += compared(
+                title, expected[nu], motion, limits=(rate, iterations) == SETTINGS[0]
+            )
+            measures.append(
                 Measure(
                     f"hand, clamps and weight out of balance, {title}",
                     "the stress of PhysX's tetrahedra",
@@ -227,7 +229,7 @@ def pulls(bench: Bench, engine: Engine) -> list[Measure]:
                     2.0 if (rate, iterations) == SETTINGS[0] else None,
                 )
             )
-    return found
+    return measures
 
 
 def speeds(bench: Bench, engine: Engine) -> list[dict]:

@@ -33,7 +33,7 @@ VAGUE = {  # as variables and parameters, and what stands instead
     "known": "what is known: prior, finite, defined",
     "own": "whose or what: seed, band_params",
 }
-SHIPPED = "pipeline", "app", "rig", "sling2sim2real", "stages", "tools", "examples"
+SHIPPED = "pipeline", "app", "rig", "sling2sim2real", "stages", "tools", "examples", "validation"
 PROSE = {
     r"hangs? on (?!its bands)": "depends on",
     r"\bin floors\b": "/ floor",

@@ -130,7 +130,7 @@ def scored(case: Case, work: Path, recordings: Path | None) -> dict:
         "seconds": identification.seconds,
         "point": [*identification.outcome.identified.values()],
     }
-    scores |= {"own_loss": identification.summary.get("loss", {}).get("total")}
+    scores |= {"own_loss": identification.confidence.get("loss", {}).get("total")}
     seen = Episode.load(case.episode(work, AS_IS) / "episode")
     scores |= forces(case.band, identification.outcome, seen)
     return scores | misses(case.band, identification.outcome, seen, recordings)

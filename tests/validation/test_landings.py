@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from tests.project import ROOT
-from validation.campaigns.landings import PAGE, SETS, OneRecording, block, figures, jobs, report_of
+from validation.campaigns.landings import (
+    PAGE,
+    SEARCHED,
+    SETS,
+    OneRecording,
+    block,
+    figures,
+    jobs,
+    report_of,
+)
 from validation.campaigns.rig_scores import TARGETS
 from validation.campaigns.runner import OURS
 from validation.rubbers import DEVELOP, SEALED, UNSEEN_LAWS, rubbers
@@ -29,6 +38,17 @@ def test_each_band_is_recorded_by_both_pulls_and_once_after_it_was_drawn() -> No
         assert len(every) - len(virgin) == 2 * len(bands) * (True in states)
     job = OneRecording(DEVELOP, "develop1", "informative", True, 0)
     assert job.params.rig.pull == "informative" and job.params.bands["develop1"].preconditioned
+
+
+def test_searched_dips_are_recorded_on_the_bands_that_a_choice_may_rest_on() -> None:
+    every = jobs(SEARCHED)
+    assert {job.band for job in every} == {*SETS["develop"][1], *SETS["bands"][1]}
+    dips = every[0].params.plan.dips
+    assert (
+        len(dips) == 3
+        and dips != OneRecording(DEVELOP, "band1", "paper", False, 0).params.plan.dips
+    )
+    assert every[0].params.rig.pull == "informative"
 
 
 def test_half_of_the_sealed_rubbers_soften_by_laws_that_none_was_developed_on() -> None:

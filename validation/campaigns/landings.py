@@ -3,6 +3,7 @@
     python -m validation.campaigns.landings develop
     python -m validation.campaigns.landings sealed     # once: validation/rubbers.py has the rules
     python -m validation.campaigns.landings bands
+    python -m validation.campaigns.landings searched   # the rule on three dips, beside these two
 
 Each band is recorded by the paper's pull and by the informative one (`plan.dips`), virgin and as it
 is after an earlier pull, and identified by the default method from that one recording; nine targets
@@ -53,6 +54,8 @@ from validation.projects import DEFAULTS
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
 PULLS = "paper", "informative"
+SEARCHED = "searched"  # the dips that validation/campaigns/pulls.py has found, instead of plan.dips
+SEARCHED_DIPS = Path("reports/validation/pulls.json")
 PAGE, README, BLOCK = Path("docs/identification.md"), Path("README.md"), "landings"
 OTHERWISE: tuple[tuple[str, dict], ...] = (  # how the first recording of a band is identified too
     ("informative", {"launched": True}),
@@ -91,7 +94,17 @@ class OneRecording:
 
     @property
     def params(self) -> Params:
-        return with_rubbers(load(DEFAULTS), self.seed, self.number, self.pull, self.worn)
+        pull = "informative" if self.pull == SEARCHED else self.pull
+        params = with_rubbers(load(DEFAULTS), self.seed, self.number, pull, self.worn)
+        return params if pull == self.pull else with_searched_dips(params)
+
+
+def with_searched_dips(params: Params) -> Params:
+    """params.yaml with three dips instead of its own."""
+    dips = json.loads(SEARCHED_DIPS.read_text(encoding="utf-8"))["dips"][SEARCHED]
+    content = params.model_dump(mode="json", exclude_unset=True)
+    content["plan"]["dips"] = dips
+    return Params.model_validate(content)
 
 
 SETS = {
@@ -103,6 +116,9 @@ SETS = {
 
 def jobs(name: str, most: int = TEN, pulls: Sequence[str] = PULLS) -> list[OneRecording]:
     """At most so many recordings of each band of a set by each pull, worn ones once."""
+    if name == SEARCHED:
+        numbers, bands = range(min(RECORDINGS, most)), (*SETS["develop"][1], *BANDS)
+        return [OneRecording(DEVELOP, band, SEARCHED, False, n) for n in numbers for band in bands]
     seed, bands, count, states = SETS[name]
     return [
         OneRecording(seed, band, pull, False, 0, **otherwise)
@@ -287,7 +303,7 @@ def report_of(name: str) -> Path:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("set", choices=SETS)
+    parser.add_argument("set", choices=[*SETS, SEARCHED])
     parser.add_argument("--page", action="store_true", help=f"only write into {PAGE} and {README}")
     parser.add_argument("--work", type=Path, default=Path(".checkpoints/landings"))
     parser.add_argument("--workers", type=int, default=cores())
@@ -314,7 +330,7 @@ def main() -> int:
     command = f"python -m validation.campaigns.landings {arguments.set}"
     report = environment("cpu", command) | {
         "jobs": [len(lines), len(todo)],
-        "plan.dips": [dict(dip) for dip in load(DEFAULTS).plan.dips],
+        "plan.dips": [dict(dip) for dip in todo[0].params.plan.dips],
         "figures": figures(lines),
         "recordings": plain([brief(line) for line in lines], 4),
     }

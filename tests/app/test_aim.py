@@ -145,7 +145,7 @@ def test_a_draw_that_misses_by_more_than_5_cm_is_to_be_refused(root) -> None:
 
 
 def test_a_failed_launch_has_no_prediction_and_failures_beside_it_no_interval(root) -> None:
-    for most, lands, about in ((0, False, "failure"), (1, True, "interval")):
+    for most, lands, warning in ((0, False, "failure"), (1, True, "interval")):
 
         def broken(draws: np.ndarray):
             launched = toy.launch(draws)
@@ -155,7 +155,7 @@ def test_a_failed_launch_has_no_prediction_and_failures_beside_it_no_interval(ro
 
         answer = shoot(root, 1.925, launcher=broken)
         assert (answer["predicted_landing_m"] is not None) is lands
-        assert answer["interval_90_m"] is None and about in abouts(answer)
+        assert answer["interval_90_m"] is None and warning in abouts(answer)
         assert (why_refused(answer) is None) is lands
 
 

@@ -35,7 +35,7 @@ def refused(sling: Callable):
 
 
 def examples() -> list[tuple[str, str]]:
-    return [(name, one.example) for name, one in COMMANDS.items()]
+    return [(name, command.example) for name, command in COMMANDS.items()]
 
 
 @pytest.mark.parametrize(("name", "example"), examples())
@@ -148,8 +148,8 @@ def test_a_mistake_in_params_is_told_before_any_stage_runs(tmp_path: Path, refus
     (tmp_path / "stages").mkdir()
     for command in ("flow", "fit --name band1", "aim --band band1 --target 1.9"):
         line = refused(1, *command.split(), folder=tmp_path)
-        known = "band1, band2, band3, band1_dip, band2_dip, band3_dip"
-        assert line == f"error: params.yaml: run.bands: band9 is not one of {known}"
+        names = "band1, band2, band3, band1_dip, band2_dip, band3_dip"
+        assert line == f"error: params.yaml: run.bands: band9 is not one of {names}"
 
 
 def test_the_version_and_a_mistake_as_a_process() -> None:
@@ -189,7 +189,7 @@ def test_aim_prints_one_json_object(tmp_path: Path, sling: Callable) -> None:
     done = sling(*arguments, "--json", folder=tmp_path)
     answer = json.loads(done.stdout)
     assert done.returncode == 3 and answer.keys() == {"refused", "warnings"}
-    assert "miss" in [one["about"] for one in answer["warnings"]]
+    assert "miss" in [row["about"] for row in answer["warnings"]]
 
     done = python("-m", "app.cli", *arguments, "--json", "--force", folder=tmp_path)
     assert done.returncode == 0
@@ -205,8 +205,8 @@ def test_aim_prints_one_json_object(tmp_path: Path, sling: Callable) -> None:
     assert done.stderr.splitlines() == message
 
     params = tmp_path / "params.yaml"
-    known = "base_to_fork: [0.5, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0]  #"
-    params.write_text(params.read_text().replace("base_to_fork:", known))
+    setting = "base_to_fork: [0.5, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0]  #"
+    params.write_text(params.read_text().replace("base_to_fork:", setting))
     done = sling(*arguments, "--force", folder=tmp_path)
     shown = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
     assert shown["tcp_position_m"] == "0.5 -0.329 0.25"

@@ -45,16 +45,16 @@ def test_a_project_that_may_not_be_written_is_refused_in_one_line(
     project: Path, words: str
 ) -> None:
     prefix = WITHOUT_POWER if os.geteuid() == 0 else ()
-    for one in (*project.rglob("*"), project):
-        one.chmod(one.stat().st_mode & ~0o222)
-    before = {one: one.stat().st_mtime_ns for one in project.rglob("*")}
-    known = environment(TMPDIR="/tmp", PYTHONDONTWRITEBYTECODE="1", HOME="/")
-    command, about = [*prefix, *SLING, *words.split()], {"capture_output": True, "text": True}
-    done = subprocess.run(command, cwd=project, env=known, timeout=240, **about)
+    for path in (*project.rglob("*"), project):
+        path.chmod(path.stat().st_mode & ~0o222)
+    before = {path: path.stat().st_mtime_ns for path in project.rglob("*")}
+    variables = environment(TMPDIR="/tmp", PYTHONDONTWRITEBYTECODE="1", HOME="/")
+    command, options = [*prefix, *SLING, *words.split()], {"capture_output": True, "text": True}
+    done = subprocess.run(command, cwd=project, env=variables, timeout=240, **options)
     assert (done.returncode, done.stdout) == (1, ""), done.stderr
     (line,) = done.stderr.splitlines()
     assert line.startswith("error: ") and "may not be read or written here" in line
-    assert {one: one.stat().st_mtime_ns for one in project.rglob("*")} == before
+    assert {path: path.stat().st_mtime_ns for path in project.rglob("*")} == before
 
 
 def test_a_project_without_git_is_told_to_dvc(project: Path) -> None:
@@ -83,22 +83,22 @@ def test_an_app_of_the_users_own_is_in_nobodys_way(tmp_path: Path) -> None:
     for name in ("app", "pipeline", "stages"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('not this one')\n")
     code = f"import sys; sys.path.append({str(ROOT)!r})\nfrom sling_command import main; main()"
-    known = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    variables = {**os.environ, "PYTHONPATH": str(tmp_path)}
     command = [sys.executable, "-c", code, "--version"]
-    done = subprocess.run(command, cwd=tmp_path, env=known, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=tmp_path, env=variables, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "") and done.stdout.startswith("sling2sim2real")
 
 
 def test_a_pipeline_of_the_users_own_is_passed_over_or_named(tmp_path: Path) -> None:
-    own = tmp_path / "pipeline.py"
-    own.write_text("")
+    module = tmp_path / "pipeline.py"
+    module.write_text("")
     code = f"import sys; sys.path.append({str(ROOT)!r})\nimport {{}}sling2sim2real as s2s"
     for first, ends in (("", ""), ("pipeline, ", "or import sling2sim2real first")):
         command = [sys.executable, "-c", code.format(first)]
-        known = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
-        done = subprocess.run(command, cwd=tmp_path, env=known, capture_output=True, text=True)
+        variables = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
+        done = subprocess.run(command, cwd=tmp_path, env=variables, capture_output=True, text=True)
         assert (done.returncode, done.stderr.strip()[-len(ends) or None :]) == (bool(first), ends)
-    assert str(own) in done.stderr
+    assert str(module) in done.stderr
 
 
 def test_the_grid_has_every_command_and_can_fail() -> None:

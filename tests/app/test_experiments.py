@@ -45,7 +45,7 @@ def experiments(project: ProjectCopy) -> set[str]:
 def test_a_value_as_it_is_leaves_every_byte(project: ProjectCopy) -> None:
     before = params(project)
     same = ("policy.seed=1", "setup.urdf=null", "trials.targets=[1.725,1.925,2.125]")
-    project(*RUN, *(word for one in same for word in ("-S", one)), "evidence@band1")
+    project(*RUN, *(word for setting in same for word in ("-S", setting)), "evidence@band1")
     assert params(project) == before
     project(*RUN, "-S", "policy.seed=2", "evidence@band1")  # what differs DVC does write there
     lines = before.splitlines(), params(project).splitlines()
@@ -55,13 +55,13 @@ def test_a_value_as_it_is_leaves_every_byte(project: ProjectCopy) -> None:
 
 def test_a_refused_value_leaves_no_trace_of_a_run_aside(project: ProjectCopy) -> None:
     """`--temp` runs in a folder of DVC's, which goes again."""
-    before, changed, known = params(project), project(*STATUS), experiments(project)
+    before, changed, refs = params(project), project(*STATUS), experiments(project)
     with pytest.raises(AssertionError, match="k_top: must be a whole number.*got 'many'"):
         project(*RUN, "--temp", "-S", "optimizer.k_top=many", "evidence@band2")
     assert params(project) == before
     assert project(*STATUS) == changed
     assert not [*(project.folder / ".dvc/tmp/exps/standalone").glob("tmp*")]
-    assert experiments(project) == known
+    assert experiments(project) == refs
 
 
 def test_a_refused_value_in_the_folder_says_how_it_goes(project: ProjectCopy) -> None:

@@ -20,7 +20,7 @@ def put(tmp_path, params, monkeypatch):
     """`observe` of band1 in an empty project, with the stages that DVC was asked for."""
     requested = []
 
-    def dvc(root, arguments, **about):
+    def dvc(root, arguments, **callbacks):
         requested.append(arguments)
         return status.pop() if status else 0, ["error: it broke"]
 
@@ -123,7 +123,7 @@ def test_a_launch_outside_its_interval_is_doubted_before_stages_run(
     monkeypatch.setattr(observe, "prediction_of", lambda *_: summary)
     for landing, doubts in ((2.09, 0), (1.91, 0), (2.11, 1), (1.89, 1)):
         answer = put.run((-0.3, -landing / 10), landing)
-        assert [one["about"] for one in answer["warnings"]] == ["miss"] * doubts
+        assert [warning["about"] for warning in answer["warnings"]] == ["miss"] * doubts
         assert capsys.readouterr().err.count("lies outside the predicted interval") == doubts
     monkeypatch.setattr(observe, "prediction_of", lambda *_: summary | {"interval_90_m": None})
     assert put.run((-0.4, -0.2), 9.0)["warnings"] == []
@@ -144,8 +144,8 @@ def test_a_draw_deeper_than_any_before_is_told_once(put, params, monkeypatch, ca
     monkeypatch.setattr(observe.Episode, "load_all", lambda folder: [episode])
     draws = (-0.30, 0), (-0.352, 0), (-0.40, 0), (-0.38, 0), (-0.402, 0), (-0.45, 0)
     summary = [put.run(draw, 2.0 + i, run=False)["warnings"] for i, draw in enumerate(draws)]
-    assert [len(one) for one in summary] == [0, 0, 1, 0, 0, 1]
-    first, second = (one[0]["what"] for one in summary if one)
+    assert [len(warnings) for warnings in summary] == [0, 0, 1, 0, 0, 1]
+    first, second = (warnings[0]["what"] for warnings in summary if warnings)
     assert "drew band1 to 0.400 m, 0.352 m was the most before" in first
     assert "count as of the softened band" in first and "0.402 m was the most" in second
     assert capsys.readouterr().err == f"warning: {first}\nwarning: {second}\n"
@@ -153,16 +153,18 @@ def test_a_draw_deeper_than_any_before_is_told_once(put, params, monkeypatch, ca
     bands = params.bands | {
         "band1": params.bands["band1"].model_copy(update={"preconditioned": True})
     }
-    known = params.model_copy(update={"bands": bands})
-    stays = known.methods["least_squares"].model_copy(update={"fixed": {"softening": 0.0}})
+    preconditioned = params.model_copy(update={"bands": bands})
+    stays = preconditioned.methods["least_squares"].model_copy(update={"fixed": {"softening": 0.0}})
     for whole, draw, words in (
-        (known, (-0.6, 0.0), None),
+        (preconditioned, (-0.6, 0.0), None),
         (with_method(params, stays), (-0.7, 0.0), "least_squares leaves that out"),
     ):
         answer = observe.observe(
             whole, "band1", "least_squares", draw, 3.0, run=False, again=True, root=put.layout.root
         )
-        assert [words in one["what"] for one in answer["warnings"]] == ([True] if words else [])
+        assert [words in warning["what"] for warning in answer["warnings"]] == (
+            [True] if words else []
+        )
 
 
 def with_method(params, method):

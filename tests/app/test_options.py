@@ -142,16 +142,16 @@ CASES = {
 def options() -> list[str]:
     """Of the parser and of each of its commands, as argparse has them."""
     top = cli.parser()
-    (commands,) = (one for one in top._actions if isinstance(one, argparse._SubParsersAction))
+    (commands,) = (group for group in top._actions if isinstance(group, argparse._SubParsersAction))
     assert commands.choices.keys() == COMMANDS.keys()
-    found = []
+    result = []
     for name, parser in (("", top), *commands.choices.items()):
         for action in parser._actions:
             if not isinstance(action, (argparse._HelpAction, argparse._SubParsersAction)):
-                found += [
+                result += [
                     f"{name} {word}".strip() for word in action.option_strings or [action.dest]
                 ]
-    return found
+    return result
 
 
 def test_each_option_has_its_case() -> None:
@@ -167,7 +167,7 @@ def furnished(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def known() -> dict[str, tuple]:
+def outcomes() -> dict[str, tuple]:
     """What came of command lines in tests so far."""
     return {}
 
@@ -189,13 +189,15 @@ def outcome(furnished, tmp_path_factory, monkeypatch, capsys):
         message = [text.replace(str(place), "") for text in capsys.readouterr()]
         assert "Traceback" not in message[1]
         files = {
-            one.relative_to(place): one.read_bytes() for one in place.rglob("*") if one.is_file()
+            file.relative_to(place): file.read_bytes()
+            for file in place.rglob("*")
+            if file.is_file()
         }
         return (
             ended.value.code,
             *message,
             files,
-            [str(one).replace(str(place), "") for one in requested],
+            [str(call).replace(str(place), "") for call in requested],
         )
 
     return run
@@ -217,7 +219,7 @@ def furnish(place: Path) -> None:
 def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
     """What takes long says what it was given."""
 
-    def dvc(root, arguments, **about) -> tuple[int, list]:
+    def dvc(root, arguments, **callbacks) -> tuple[int, list]:
         requested.append(arguments)
         card = Layout(root).card(arguments[1].partition("@")[2])
         card.mkdir(parents=True)
@@ -233,7 +235,7 @@ def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
 
     def bench(arguments: argparse.Namespace, what: str) -> str:
         given = vars(arguments).items()
-        return summary(what, *(one for one in given if one[0] not in ("command", "refuse")))
+        return summary(what, *(pair for pair in given if pair[0] not in ("command", "refuse")))
 
     def summary(*given, **more) -> str:
         requested.append((*map(str, given), sorted(map(str, more.items()))))
@@ -258,21 +260,21 @@ def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
     patch.setattr("validation.figures.listed", lambda *given: [])
 
 
-def once(known: dict[str, tuple], outcome: Callable[[str], tuple], line: str) -> tuple:
-    if line not in known:
-        known[line] = outcome(line)
-    return known[line]
+def once(outcomes: dict[str, tuple], outcome: Callable[[str], tuple], line: str) -> tuple:
+    if line not in outcomes:
+        outcomes[line] = outcome(line)
+    return outcomes[line]
 
 
 @pytest.mark.parametrize("option", CASES)
-def test_an_option_takes_effect_or_is_refused(known, outcome, option: str) -> None:
+def test_an_option_takes_effect_or_is_refused(outcomes, outcome, option: str) -> None:
     first, second = CASES[option]
-    before, after = once(known, outcome, first), outcome(second)
+    before, after = once(outcomes, outcome, first), outcome(second)
     assert before[0] != 2, before
     assert before != after
 
 
 @pytest.mark.parametrize("line", dict.fromkeys(first for first, _ in CASES.values()))
-def test_what_comes_of_a_command_line_is_the_same_again(known, outcome, line: str) -> None:
+def test_what_comes_of_a_command_line_is_the_same_again(outcomes, outcome, line: str) -> None:
     """Else the test above would prove nothing."""
-    assert once(known, outcome, line) == outcome(line)
+    assert once(outcomes, outcome, line) == outcome(line)

@@ -53,7 +53,9 @@ def test_ten_bands_make_ten_chains_of_the_first_method(project, first: str) -> N
     for name in names:
         card = stage_of(params, "card", name)
         chain = {stage.name for stage in leading_to(stages, card)}
-        assert card == f"own_card@{name}" and chain == {one for one in mine if is_of(one, name)}
+        assert card == f"own_card@{name}" and chain == {
+            stage for stage in mine if is_of(stage, name)
+        }
         for step in steps:
             assert stage_of(params, step, name, first) in chain
         assert stage_of(params, "theta", name, methods[1]) is None
@@ -84,14 +86,14 @@ def test_such_a_stage_is_its_namesake_but_for_the_band(
             f"dip_launches@{band}-least_squares"
         )
     with Repo(str(project.folder)) as repo:
-        known = {stage.name: stage for stage in repo.index.stages}
-    own = [name for name in known if name.startswith(kind)]
-    assert len(own) == count
+        stages = {stage.name: stage for stage in repo.index.stages}
+    names = [name for name in stages if name.startswith(kind)]
+    assert len(names) == count
 
     def read(name: str, band: str) -> set[str]:
-        return {f"{dep}".replace(band, "BAND") for dep in known[name].deps}
+        return {f"{dep}".replace(band, "BAND") for dep in stages[name].deps}
 
-    for name in own:
+    for name in names:
         rigs = name.removeprefix(kind).replace(f"@{band}", "@band1")
         assert read(name, band) == read(rigs, "band1")
-        assert known[name].cmd == known[rigs].cmd.replace("band1", band)
+        assert stages[name].cmd == stages[rigs].cmd.replace("band1", band)

@@ -126,9 +126,10 @@ def test_the_recorded_draw_is_the_pose_that_the_robot_reported(recorded) -> None
         poses = [message[3] for message in reader.iter_decoded_messages(["/arm/current_pose"])]
     start = poses[0].header.stamp.sec + poses[0].header.stamp.nanosec * 1e-9
     reported = next(
-        one
-        for one in reversed(poses)
-        if one.header.stamp.sec + one.header.stamp.nanosec * 1e-9 - start < truth.release - 0.01
+        message
+        for message in reversed(poses)
+        if message.header.stamp.sec + message.header.stamp.nanosec * 1e-9 - start
+        < truth.release - 0.01
     )
     pose = at(-truth.draw, 0.0, standing(None), root)
     assert pose["tcp_frame"] == reported.header.frame_id == "base"

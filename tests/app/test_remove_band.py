@@ -62,8 +62,8 @@ def test_all_of_a_band_goes_and_nothing_else(project: Path) -> None:
     assert "orange:" not in text and "  own:" in text and "  - orange_2\n" in text
     lines = output.splitlines()
     assert lines[0] == "orange removed:" and [line.strip() for line in lines[1:]] == requested
-    for one in (Layout(project).raw("orange"), Layout(project).card("orange")):
-        assert str(one) in requested  # a folder is one line
+    for folder in (Layout(project).raw("orange"), Layout(project).card("orange")):
+        assert str(folder) in requested  # a folder is one line
     remove_band("orange_2", lambda lines: True, project)
     assert (project / "params.yaml").read_text("utf-8") == DEFAULTS.read_text("utf-8")
 

@@ -75,36 +75,36 @@ def test_a_draw_outside_the_box(params, project) -> None:
 def test_a_draw_beyond_the_recorded_stretch_says_both_in_per_cent(params, project) -> None:
     """Two sides of a triangle: 0.1375 and 0.3 against 0.1375 and 0.4, rest length 0.52."""
     edit(project, "  - -0.30\n  - -0.10\n", "  - -0.30\n  - 0.0\n")
-    (found,) = safety.of_draw(params, "band1", (-0.4, -0.1), project)
+    (hazard,) = safety.of_draw(params, "band1", (-0.4, -0.1), project)
     requested = 2 * np.hypot(0.1375, np.hypot(0.4, 0.1)) / 0.52 - 1
     recorded = 2 * np.hypot(0.1375, 0.3) / 0.52 - 1
     assert (
         f"by {100 * requested:.1f} %, its recordings by {100 * recorded:.1f} % at most"
-        in found.what
+        in hazard.what
     )
 
 
 def test_without_an_episode_the_recorded_stretch_is_unknown(params, tmp_path) -> None:
-    (found,) = safety.of_draw(params, "band1", (-0.3, -0.2), tmp_path)
-    assert found.about == "stretch" and "data/episodes/band1 is missing" in found.what
+    (hazard,) = safety.of_draw(params, "band1", (-0.3, -0.2), tmp_path)
+    assert hazard.about == "stretch" and "data/episodes/band1 is missing" in hazard.what
 
 
 def test_more_force_than_the_arm_may_hold(params) -> None:
     limit = params.setup.max_force
     assert not list(safety.of_launch(params, limit, None))
-    (found,) = safety.of_launch(params, limit + 1, None)
-    assert found.about == "force" and "31.0 N, more than setup.max_force 30 N" in found.what
+    (hazard,) = safety.of_launch(params, limit + 1, None)
+    assert hazard.about == "force" and "31.0 N, more than setup.max_force 30 N" in hazard.what
     assert abouts(safety.of_launch(params, np.nan, "it broke")) == ["failure"]
 
 
 def test_a_posterior_that_has_not_settled_or_is_not_there(tmp_path) -> None:
     assert not list(safety.of_confidence(CONTENT, tmp_path))
     content = CONTENT | {"confidence": {"settled": False, "steps": 14}}
-    (found,) = safety.of_confidence(content, tmp_path / "t.json")
-    assert "t.json had not settled after 14 steps" in found.what
+    (hazard,) = safety.of_confidence(content, tmp_path / "t.json")
+    assert "t.json had not settled after 14 steps" in hazard.what
     for content in (CONTENT | {"confidence": None}, {"theta": VALUES}):
-        (found,) = safety.of_confidence(content, tmp_path)
-        assert found.about == "confidence" and "does not tell how well" in found.what
+        (hazard,) = safety.of_confidence(content, tmp_path)
+        assert hazard.about == "confidence" and "does not tell how well" in hazard.what
 
 
 def identified(params, **then) -> dict:
@@ -135,8 +135,8 @@ def test_params_that_changed_since_training_by_key_values_and_cure(params, proje
 def test_a_theta_identified_anew_hides_no_change_of_the_policys(params, project) -> None:
     """θ was identified with today's mass, the policy trained before."""
     card(project, made_with=trained(params, **{"bands.band1.mass": 0.05}))
-    (found,) = of_policy(params, project, identified(params))
-    assert "bands.band1.mass was 0.05, is 0.023" in found.what
+    (hazard,) = of_policy(params, project, identified(params))
+    assert "bands.band1.mass was 0.05, is 0.023" in hazard.what
 
 
 def test_many_changes_are_three_and_the_names_of_the_others(params, project) -> None:
@@ -149,9 +149,9 @@ def test_many_changes_are_three_and_the_names_of_the_others(params, project) -> 
 
 def test_a_card_that_does_not_tell(params, project) -> None:
     card(project, made_with=None)
-    (found,) = of_policy(params, project)
+    (hazard,) = of_policy(params, project)
     assert (
-        found.what
+        hazard.what
         == f"nothing tells what the policy was trained with: `dvc repro {STAGE}` mends it"
     )
 
@@ -160,13 +160,13 @@ def test_a_policy_of_another_theta(params, project) -> None:
     card(project)
     assert not of_policy(params, project)
     other = CONTENT | {"theta": VALUES | {"youngs_modulus": 5e5}}
-    (found,) = of_policy(params, project, other)
-    assert "another θ" in found.what and f"`dvc repro {STAGE}`" in found.what
+    (hazard,) = of_policy(params, project, other)
+    assert "another θ" in hazard.what and f"`dvc repro {STAGE}`" in hazard.what
 
 
 def test_a_policy_without_a_card(params, project) -> None:
-    (found,) = of_policy(params, project)
-    assert found.about == "params" and "card.json: missing" in found.what
+    (hazard,) = of_policy(params, project)
+    assert hazard.about == "params" and "card.json: missing" in hazard.what
 
 
 def test_theta_of_a_run_and_by_hand(params, project) -> None:
@@ -179,8 +179,8 @@ def test_theta_of_a_run_and_by_hand(params, project) -> None:
     ]
     assert not list(safety.of_identification(params, content, project / "mine.json"))
     assert not list(safety.of_identification(params, identified(params), path))
-    (found,) = safety.of_identification(params, CONTENT, path)
-    assert found.what.startswith("nothing tells with which params.yaml θ was identified")
+    (hazard,) = safety.of_identification(params, CONTENT, path)
+    assert hazard.what.startswith("nothing tells with which params.yaml θ was identified")
 
 
 def test_launches_as_evidence_are_settings_too(params, project) -> None:
@@ -188,13 +188,13 @@ def test_launches_as_evidence_are_settings_too(params, project) -> None:
     then = settings_of(params, "band1", "least_squares") | evidence_settings_of(params)
     content = CONTENT | {"confidence": seen, "made_with": then | {"setup.projectile_mass": 0.05}}
     path = Layout(project).theta("band1", "least_squares")
-    (found,) = safety.of_identification(params, content, path)
-    assert "setup.projectile_mass was 0.05, is 0.039" in found.what
+    (hazard,) = safety.of_identification(params, content, path)
+    assert "setup.projectile_mass was 0.05, is 0.039" in hazard.what
 
 
 def test_a_method_that_runs_no_more_is_mended_by_naming_it(params, project) -> None:
     card(project, made_with=trained(params, **{"setup.max_force": 28.0}))
     run = params.run.model_copy(update={"bands": [], "methods": []})
     run = run.model_copy(update={"ablations": SimpleNamespace(bands=[], methods=[])})
-    (found,) = of_policy(params.model_copy(update={"run": run}), project)
-    assert "`run:` in params.yaml has to name" in found.what
+    (hazard,) = of_policy(params.model_copy(update={"run": run}), project)
+    assert "`run:` in params.yaml has to name" in hazard.what

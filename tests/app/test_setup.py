@@ -73,9 +73,9 @@ def test_everything_is_written_and_nothing_else_changes(path) -> None:
     # the fork's y is the base's x, which a camera that looks down has as its x
     np.testing.assert_allclose(seen @ [0, 1, 0, 1], [1, 0, 0.98, 1], atol=1e-4)
     after = path.read_text().splitlines()
-    notes = [[line.partition("#")[2] for line in one if "#" in line] for one in (before, after)]
+    notes = [[line.partition("#")[2] for line in lines if "#" in line] for lines in (before, after)]
     assert notes[0] == notes[1]
-    old, new = (YAML(typ="safe").load("\n".join(one)) for one in (before, after))
+    old, new = (YAML(typ="safe").load("\n".join(lines)) for lines in (before, after))
     keys = {key for key, value in new["setup"].items() if old["setup"][key] != value}
     assert keys == done["changed"].keys() and len(keys) == 5
     assert new | {"setup": old["setup"]} == old

@@ -25,6 +25,6 @@ def model() -> Model:
 @pytest.fixture(scope="session")
 def outside() -> list[str]:
     """Where other packages lie, but not this project."""
-    return [one for one in sys.path if one.endswith(("-packages", "lib-dynload", ".zip"))] + [
-        one for one in sys.path if one.rstrip("/").endswith(f"python3.{sys.version_info.minor}")
+    return [path for path in sys.path if path.endswith(("-packages", "lib-dynload", ".zip"))] + [
+        path for path in sys.path if path.rstrip("/").endswith(f"python3.{sys.version_info.minor}")
     ]

@@ -43,7 +43,7 @@ def test_what_it_refuses(model, tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(UserError, match=r"mujoco is not installed: make setup"):
         export(model, "mjcf", tmp_path / "toy")
-    assert [one.name for one in tmp_path.rglob("*")] == ["mine", "thesis.tex"]
+    assert [path.name for path in tmp_path.rglob("*")] == ["mine", "thesis.tex"]
 
 
 def test_the_command(tmp_path, sling) -> None:

@@ -30,8 +30,8 @@ def done(model, tmp_path_factory):
 def chain(model, done) -> SpringChain:
     draws = draws_of(model)
     start = SpringChain.of(model, draws, model.launches(draws).hold_force)
-    found = {row["name"]: row["value"] for row in done.card["matched"]}
-    return replace(start, step=done.card["time_step_s"], **found)
+    matched = {row["name"]: row["value"] for row in done.card["matched"]}
+    return replace(start, step=done.card["time_step_s"], **matched)
 
 
 def test_it_is_proven_on_draws_that_took_no_part(model, done) -> None:
@@ -78,11 +78,11 @@ def test_another_band_would_be_noticed(model, chain) -> None:
 
 def test_it_is_held_as_in_mujoco() -> None:
     """The loader imports nothing of the project, so that it has constants of its own."""
-    own = loader()
-    assert (own.SETTLE, own.BRAKE, own.LONGEST) == (
+    module = loader()
+    assert (module.SETTLE, module.BRAKE, module.LONGEST) == (
         mujoco_replay.SETTLE, mujoco_replay.BRAKE, mujoco_replay.LONGEST,
     )  # fmt: skip
-    assert (own.HAND_MASS, own.STIFF, own.GRAVITY) == (mjcf.HAND_MASS, mjcf.STIFF, GRAVITY)
+    assert (module.HAND_MASS, module.STIFF, module.GRAVITY) == (mjcf.HAND_MASS, mjcf.STIFF, GRAVITY)
 
 
 @pytest.mark.parametrize("stiffness", [1.2e4, None])

@@ -37,19 +37,20 @@ def test_usd_and_the_schemas_of_physx_know_all_that_is_in_it(done) -> None:
     physx_usd_schemas.register_all()
     stage = Usd.Stage.Open(str(done.folder / "toy.usda"))
     assert UsdGeom.GetStageMetersPerUnit(stage) == UsdPhysics.GetStageKilogramsPerUnit(stage) == 1
-    found = UsdValidation.ValidationContext(
+    errors = UsdValidation.ValidationContext(
         UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     ).Validate(stage)
-    assert [one.GetMessage() for one in found] == []
+    assert [error.GetMessage() for error in errors] == []
     for prim in stage.Traverse():
-        known = set(prim.GetPrimDefinition().GetPropertyNames())
+        defined = set(prim.GetPrimDefinition().GetPropertyNames())
         unknown = {
             GetAuthoredProperty.GetName() for GetAuthoredProperty in prim.GetAuthoredProperties()
-        } - known
-        assert {one for one in unknown if not one.startswith(("xformOp", "material:"))} == set()
+        } - defined
+        assert {name for name in unknown if not name.startswith(("xformOp", "material:"))} == set()
     band = UsdGeom.TetMesh(stage.GetPrimAtPath("/World/Band"))
     points, tets = (
-        np.array(one.Get()) for one in (band.GetPointsAttr(), band.GetTetVertexIndicesAttr())
+        np.array(attribute.Get())
+        for attribute in (band.GetPointsAttr(), band.GetTetVertexIndicesAttr())
     )
     corners = points[tets]
     assert (np.linalg.det(corners[:, 1:] - corners[:, :1]) > 0).all()

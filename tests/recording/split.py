@@ -26,8 +26,8 @@ def split(file: Path, folder: Path, cuts: tuple[float, ...], stem: str = "my") -
                 if not low <= (message.log_time - start) * 1e-9 < high:
                     continue
                 if channel.topic not in channels:
-                    known = writer.register_schema(schema.name, schema.encoding, schema.data)
-                    number_of = writer.register_channel(channel.topic, "cdr", known)
+                    schema_id = writer.register_schema(schema.name, schema.encoding, schema.data)
+                    number_of = writer.register_channel(channel.topic, "cdr", schema_id)
                     channels[channel.topic] = number_of
                 times = message.log_time, message.data, message.publish_time
                 writer.add_message(channels[channel.topic], *times)
@@ -37,6 +37,6 @@ def split(file: Path, folder: Path, cuts: tuple[float, ...], stem: str = "my") -
 
 def metadata(folder: Path, *names: str) -> None:
     """As rosbag2 writes it, but for what is not read."""
-    about = {"version": 5, "storage_identifier": "mcap", "relative_file_paths": list(names)}
-    text = json.dumps({"rosbag2_bagfile_information": about})  # JSON is YAML
+    fields = {"version": 5, "storage_identifier": "mcap", "relative_file_paths": list(names)}
+    text = json.dumps({"rosbag2_bagfile_information": fields})  # JSON is YAML
     (folder / "metadata.yaml").write_text(text)

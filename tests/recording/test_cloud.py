@@ -64,7 +64,9 @@ def test_the_papers_order_samples_first_and_so_keeps_more_strays() -> None:
     def rows(cloud: np.ndarray) -> set:
         return {tuple(row) for row in np.asarray(cloud, np.float32).tolist()}
 
-    ours, papers = (rows(cloud.sample(points, one)) for one in (settings, literal))
+    ours, papers = (
+        rows(cloud.sample(points, cloud_params)) for cloud_params in (settings, literal)
+    )
     assert ours == rows(sampled(filtered(points)))
     assert papers == rows(filtered(sampled(points)))
     assert len(ours) == settings.points > len(papers) > 0.5 * settings.points

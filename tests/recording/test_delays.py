@@ -50,12 +50,12 @@ def test_the_poses_delay_is_found_by_the_tools_inertia(heavy, noise) -> None:
     for seed in range(20):
         wrench = recording.wrench
         shaken = np.random.default_rng(seed).normal(0, noise, wrench.values.shape)
-        one = replaced(recording, wrench=replace(wrench, values=wrench.values + shaken))
+        changed = replaced(recording, wrench=replace(wrench, values=wrench.values + shaken))
         seconds = INJECTED[seed % 4]
-        found = estimate_tool_inertia(Pull(late(one, "pose", seconds), geometry), None)
-        off.append(found.delay - seconds)
-        errors.append(found.delay_error)
-        assert found.mass == pytest.approx(0.7, abs=5 * found.mass_error)
+        inertia = estimate_tool_inertia(Pull(late(changed, "pose", seconds), geometry), None)
+        off.append(inertia.delay - seconds)
+        errors.append(inertia.delay_error)
+        assert inertia.mass == pytest.approx(0.7, abs=5 * inertia.mass_error)
     assert np.abs(off).max() <= 0.05 * noise  # s for each newton
     assert 0.5 < np.sqrt(np.mean((np.array(off) / errors) ** 2)) < 1.5
 
@@ -70,12 +70,14 @@ def test_a_slow_pose_that_loses_messages_makes_no_delay_up(heavy, share) -> None
         keep = np.arange(seed, len(pose.stamp), 15)
         keep = keep[random.random(len(keep)) >= share]
         fewer = replace(pose, stamp=pose.stamp[keep], values=pose.values[keep])
-        one = replaced(recording, pose=fewer)
-        found = estimate_tool_inertia(Pull(late(one, "pose", INJECTED[seed % 4]), geometry), None)
-        if found is None:
+        changed = replaced(recording, pose=fewer)
+        inertia = estimate_tool_inertia(
+            Pull(late(changed, "pose", INJECTED[seed % 4]), geometry), None
+        )
+        if inertia is None:
             continue
-        off = found.delay - INJECTED[seed % 4]
-        assert abs(off) < 0.002 or abs(off) < 3 * found.delay_error
+        off = inertia.delay - INJECTED[seed % 4]
+        assert abs(off) < 0.002 or abs(off) < 3 * inertia.delay_error
 
 
 def test_a_force_that_does_not_feel_the_tool_says_nothing_of_the_pose() -> None:
@@ -95,9 +97,9 @@ def looked_at(seen, params):
 def test_the_cameras_delay_is_found_by_the_hand_in_its_pictures(looked_at, params, seconds) -> None:
     recording, geometry = looked_at
     changed = late(late(recording, "depth", seconds), "color", seconds)
-    found = correct_delays(Pull(changed, geometry), params)[1].camera
-    assert found.against == "pose" and found.left < 0.001
-    assert abs(found.value - seconds) <= 0.001
+    estimate = correct_delays(Pull(changed, geometry), params)[1].camera
+    assert estimate.against == "pose" and estimate.left < 0.001
+    assert abs(estimate.value - seconds) <= 0.001
 
 
 def test_wrong_extrinsics_are_no_delay(looked_at) -> None:
@@ -120,14 +122,14 @@ def test_black_pictures_say_nothing(blind, params) -> None:
 def test_what_is_applied(looked_at, params) -> None:
     recording, geometry = looked_at
     pull = Pull(recording, geometry)
-    right, found = correct_delays(pull, params)
-    assert abs(found.pose.value) < 0.001 and not found.pose.applied  # the hand starts back
-    assert abs(found.camera.value) < 0.001 and found.camera.applied
+    right, estimates = correct_delays(pull, params)
+    assert abs(estimates.pose.value) < 0.001 and not estimates.pose.applied  # the hand starts back
+    assert abs(estimates.camera.value) < 0.001 and estimates.camera.applied
     off = (right.recording.depth.stamp - recording.depth.stamp) * 1e-9
-    np.testing.assert_allclose(off, -found.camera.value, atol=1e-9)
+    np.testing.assert_allclose(off, -estimates.camera.value, atol=1e-9)
 
-    right, found = correct_delays(Pull(late(recording, "depth", 0.015), geometry), params)
-    assert found.camera.applied and found.camera.value == pytest.approx(0.015, abs=0.001)
+    right, estimates = correct_delays(Pull(late(recording, "depth", 0.015), geometry), params)
+    assert estimates.camera.applied and estimates.camera.value == pytest.approx(0.015, abs=0.001)
     right = right.recording
     np.testing.assert_allclose((right.depth.stamp - recording.depth.stamp) * 1e-9, 0, atol=1e-3)
 
@@ -137,9 +139,9 @@ def test_a_late_force_is_a_pose_that_is_early(looked_at, params, seconds) -> Non
     """The hand starts back before the force falls: both pose and camera are put right."""
     recording, geometry = looked_at
     changed = replace(late(recording, "wrench", seconds), start=recording.origin)
-    _, found = correct_delays(Pull(changed, geometry), params)
-    assert found.pose.applied and found.pose.value == pytest.approx(-seconds, abs=0.002)
-    assert found.pose.left < 0.002 and not found.conflict
+    _, estimates = correct_delays(Pull(changed, geometry), params)
+    assert estimates.pose.applied and estimates.pose.value == pytest.approx(-seconds, abs=0.002)
+    assert estimates.pose.left < 0.002 and not estimates.conflict
 
 
 @pytest.mark.parametrize(("back", "conflict"), [(0.001, False), (0.02, True)])
@@ -148,10 +150,10 @@ def test_two_estimates_are_weighed_or_said(looked_at, params, monkeypatch, back,
     tool = ToolInertia(1.0, 0.01, 0.0, 0.001)
     monkeypatch.setattr(delays, "estimate_tool_inertia", lambda *_: tool)
     monkeypatch.setattr(delays, "start_back", lambda _: (back, 0.001))
-    found = correct_delays(Pull(*looked_at), params)[1]
-    assert bool(found.conflict) == conflict and not found.pose.applied
-    assert found.pose.value == pytest.approx(0.0 if conflict else back / 2)
-    assert found.pose.error == pytest.approx(0.001 if conflict else 0.001 / np.sqrt(2))
+    estimates = correct_delays(Pull(*looked_at), params)[1]
+    assert bool(estimates.conflict) == conflict and not estimates.pose.applied
+    assert estimates.pose.value == pytest.approx(0.0 if conflict else back / 2)
+    assert estimates.pose.error == pytest.approx(0.001 if conflict else 0.001 / np.sqrt(2))
 
 
 def given(params, **delays):
@@ -165,10 +167,10 @@ def test_given_delays_that_are_right_are_kept(looked_at, params) -> None:
     recording, geometry = looked_at
     changed = late(late(recording, "pose", -0.012), "depth", 0.3)
     summary = given(params, pose=-0.012, camera=0.3)
-    right, found = correct_delays(Pull(late(changed, "color", 0.3), geometry), summary)
-    assert (found.pose.value, found.camera.value) == (-0.012, 0.3)
-    assert found.pose.source == found.camera.source == "setup" and not found.conflict
-    assert 0 < found.pose.left < 0.003 and 0 < found.camera.left < 0.002
+    right, estimates = correct_delays(Pull(late(changed, "color", 0.3), geometry), summary)
+    assert (estimates.pose.value, estimates.camera.value) == (-0.012, 0.3)
+    assert estimates.pose.source == estimates.camera.source == "setup" and not estimates.conflict
+    assert 0 < estimates.pose.left < 0.003 and 0 < estimates.camera.left < 0.002
     for role in ("pose", "depth", "color"):
         assert np.all(getattr(right.recording, role).stamp == getattr(recording, role).stamp)
 
@@ -177,9 +179,9 @@ def test_a_given_delay_that_the_recording_does_not_show(looked_at, params, monke
     """It has the error of a given number, and is taken off."""
     for name in ("camera_delay", "start_back", "release_pictures"):
         monkeypatch.setattr(delays, name, lambda *_: None)
-    _, found = correct_delays(Pull(*looked_at), given(params, pose=-0.004, camera=0.0))
-    assert found.pose == Estimate(-0.004, 0.002, "setup", True, 0.002, given=-0.004)
-    assert found.camera == Estimate(0.0, 0.005, "setup", False, 0.005, given=0.0)
+    _, estimates = correct_delays(Pull(*looked_at), given(params, pose=-0.004, camera=0.0))
+    assert estimates.pose == Estimate(-0.004, 0.002, "setup", True, 0.002, given=-0.004)
+    assert estimates.camera == Estimate(0.0, 0.005, "setup", False, 0.005, given=0.0)
 
 
 @pytest.mark.parametrize("summary", [0.0, 0.03])
@@ -187,10 +189,10 @@ def test_a_given_delay_that_is_wrong_is_put_right(looked_at, params, summary) ->
     """The camera is 12 ms late, whatever was given."""
     recording, geometry = looked_at
     pull = Pull(late(late(recording, "depth", 0.012), "color", 0.012), geometry)
-    right, found = correct_delays(pull, given(params, camera=summary))
-    assert found.camera.value == pytest.approx(0.012, abs=0.001) and found.camera.applied
-    assert found.camera.rest == pytest.approx(0.012 - summary, abs=0.001)
-    assert found.camera.left < 0.002
+    right, estimates = correct_delays(pull, given(params, camera=summary))
+    assert estimates.camera.value == pytest.approx(0.012, abs=0.001) and estimates.camera.applied
+    assert estimates.camera.rest == pytest.approx(0.012 - summary, abs=0.001)
+    assert estimates.camera.left < 0.002
     off = (right.recording.depth.stamp - recording.depth.stamp) * 1e-9
     np.testing.assert_allclose(off, 0, atol=1e-3)
 
@@ -198,31 +200,31 @@ def test_a_given_delay_that_is_wrong_is_put_right(looked_at, params, summary) ->
 def test_a_given_delay_tells_a_clock_from_the_robots_own_motion(looked_at, params) -> None:
     recording, geometry = looked_at
     early = Pull(late(recording, "pose", 0.02), geometry)
-    _, found = correct_delays(early, given(params, pose=0.0))
-    assert found.pose.value == 0.0 and found.pose.left == 0.002
-    assert "moves by itself" in found.conflict
-    _, found = correct_delays(early, given(params, pose=0.015))
-    assert found.pose.value == pytest.approx(0.02, abs=0.002) and not found.conflict
+    _, estimates = correct_delays(early, given(params, pose=0.0))
+    assert estimates.pose.value == 0.0 and estimates.pose.left == 0.002
+    assert "moves by itself" in estimates.conflict
+    _, estimates = correct_delays(early, given(params, pose=0.015))
+    assert estimates.pose.value == pytest.approx(0.02, abs=0.002) and not estimates.conflict
 
 
 @pytest.mark.parametrize(
-    ("window", "own", "alone"),
+    ("window", "late_start", "alone"),
     [((-0.01, 0.035), False, True), ((-0.01, 0.015), True, False), ((0.01, 0.035), False, False)],
 )
 def test_the_camera_tells_a_late_pose_from_a_late_start(
-    looked_at, params, monkeypatch, window, own, alone
+    looked_at, params, monkeypatch, window, late_start, alone
 ) -> None:
     """The hand starts 20 ms late: by its pictures as the pose says, by those of the release not.
 
     Args:
         window: Of the camera's delay against the force, as the pictures of the release show it.
-        own: Whether the robot started so by itself.
+        late_start: Whether the robot started so by itself.
         alone: Whether both are possible.
     """
 
     def pictures(pull: Pull, _):
         taken = (looked_at[0].depth.stamp[0] - pull.recording.depth.stamp[0]) * 1e-9
-        low, high = (one - taken for one in window)
+        low, high = (bound - taken for bound in window)
         return ReleasePictures(low, high, low + 0.015, high, (), (), ())
 
     def by_hand(pull: Pull):
@@ -236,7 +238,11 @@ def test_the_camera_tells_a_late_pose_from_a_late_start(
     monkeypatch.setattr(delays, "start_back", lambda _: (0.02, 0.001))
     monkeypatch.setattr(delays, "camera_delay", by_hand)
     monkeypatch.setattr(delays, "release_pictures", pictures)
-    _, found = correct_delays(Pull(*looked_at), params)
-    assert found.pose.applied != own and found.pose.alone == alone and not found.conflict
-    assert found.camera.value == pytest.approx(0.0 if own else 0.02)
-    assert found.pose.left == pytest.approx(0.003 if own else 0.001)
+    _, estimates = correct_delays(Pull(*looked_at), params)
+    assert (
+        estimates.pose.applied != late_start
+        and estimates.pose.alone == alone
+        and not estimates.conflict
+    )
+    assert estimates.camera.value == pytest.approx(0.0 if late_start else 0.02)
+    assert estimates.pose.left == pytest.approx(0.003 if late_start else 0.001)

@@ -61,10 +61,10 @@ def done(request, params, tmp_path_factory):
 
 
 def test_no_check_takes_a_dip_for_a_fault(done) -> None:
-    found = [
+    findings = [
         finding for finding in done[2].findings if "it swings" not in finding.what
     ]  # as it is made
-    assert {one.about for one in found} <= ASIDE
+    assert {finding.about for finding in findings} <= ASIDE
 
 
 def test_it_is_one_pull_whose_events_are_found(done) -> None:
@@ -118,6 +118,6 @@ def test_no_dip_that_an_arm_can_do_is_a_release(leg, depth) -> None:
     time = np.arange(0, truth.release + 1, 1e-3)
     force = np.array([truth.force(t) for t in time])
     force += np.random.default_rng(0).normal(0, 0.04, force.shape)
-    found = find_release(time, force)
-    assert found.time == pytest.approx(truth.release, abs=2e-3)
+    release = find_release(time, force)
+    assert release.time == pytest.approx(truth.release, abs=2e-3)
     assert len(find_releases(time, force, None)) == 1

@@ -33,10 +33,10 @@ def test_release_between_samples_is_unbiased_and_its_error_is_true(rate, noise) 
         fall = random.choice([0.0, random.uniform(0, 6e-3)])
         t, force = pull(release, fall, noise, seed, rate, start=5.0)
         retained = random.random(len(t)) >= 0.02
-        found = find_release(t[retained], force[retained])
-        off.append(found.time - release)
-        error.append(found.error)
-        resolution.append(found.resolution)
+        event = find_release(t[retained], force[retained])
+        off.append(event.time - release)
+        error.append(event.error)
+        resolution.append(event.resolution)
     off, error = np.array(off), np.array(error)
     period = max(1 / rate, 5e-4)
     assert np.percentile(np.abs(off), 95) <= 0.7 * period
@@ -48,25 +48,25 @@ def test_release_between_samples_is_unbiased_and_its_error_is_true(rate, noise) 
 def test_a_fall_within_one_sample_is_put_between_the_two() -> None:
     """The last held and the first fallen sample bound it; neither is more likely."""
     t, force = pull(7.5003, 0.0, 0.02, 1)
-    found = find_release(t, force)
-    assert 7.5002 < found.time < 7.5007
-    assert found.error == pytest.approx(1e-3 / np.sqrt(12), rel=0.15)
+    event = find_release(t, force)
+    assert 7.5002 < event.time < 7.5007
+    assert event.error == pytest.approx(1e-3 / np.sqrt(12), rel=0.15)
 
 
 @pytest.mark.parametrize("noise", [0.005, 0.15])
 def test_release_is_found_to_a_millisecond(noise) -> None:
     for seed in range(12):
         release, fall = 7.5 + 0.00037 * seed, (0.0, 0.002, 0.005, 0.02)[seed % 4]
-        found = find_release(*pull(release, fall, noise, seed))
-        assert abs(found.time - release) <= 1e-3
-        assert found.drop == pytest.approx(12, rel=0.02)
-        assert found.noise == pytest.approx(noise, rel=0.3)
+        event = find_release(*pull(release, fall, noise, seed))
+        assert abs(event.time - release) <= 1e-3
+        assert event.drop == pytest.approx(12, rel=0.02)
+        assert event.noise == pytest.approx(noise, rel=0.3)
 
 
 def test_release_at_a_low_rate_says_so() -> None:
-    found = find_release(*pull(7.5, 0.0, 0.02, 1, rate=100.0))
-    assert found.resolution == pytest.approx(0.01)
-    assert abs(found.time - 7.5) <= 0.01
+    event = find_release(*pull(7.5, 0.0, 0.02, 1, rate=100.0))
+    assert event.resolution == pytest.approx(0.01)
+    assert abs(event.time - 7.5) <= 0.01
 
 
 def test_ringing_and_a_bump_before_do_not_move_the_release() -> None:
@@ -97,17 +97,17 @@ def test_a_slip_before_is_no_release_but_is_told() -> None:
     t, force = pull(7.5, 0.0, 0.03, 3)
     bias = np.array([3.0, -2.0, 7.0])
     force[t >= 5.5] = bias + 0.4 * (force[t >= 5.5] - bias)
-    found = find_release(t, force)
-    assert abs(found.time - 7.5) <= 1e-3
-    assert found.drop == pytest.approx(0.4 * 12, rel=0.02)
-    np.testing.assert_allclose(found.slips, [5.5], atol=0.01)
+    event = find_release(t, force)
+    assert abs(event.time - 7.5) <= 1e-3
+    assert event.drop == pytest.approx(0.4 * 12, rel=0.02)
+    np.testing.assert_allclose(event.slips, [5.5], atol=0.01)
 
 
 def test_a_knock_in_the_lead_in_is_no_release() -> None:
     t, force = pull(7.5, 0.0, 0.03, 3)
     force[(t > 0.6) & (t < 0.62)] += [0.0, 40.0, 0.0]
-    found = find_release(t, force)
-    assert abs(found.time - 7.5) <= 1e-3 and found.slips == []
+    event = find_release(t, force)
+    assert abs(event.time - 7.5) <= 1e-3 and event.slips == []
 
 
 def test_two_pulls_are_refused_unless_the_fingers_tell() -> None:

@@ -33,13 +33,13 @@ def test_raw_pictures_are_what_the_packed_ones_hold(seen, params, tmp_path) -> N
     """rgb8, and depth in metres."""
     path = tmp_path / "raw.mcap"
     translate(seen[0], path, "protobuf", raw=True)
-    usual, raw = (read_recording(one, params.setup) for one in (seen[0], path))
+    usual, raw = (read_recording(file, params.setup) for file in (seen[0], path))
     assert raw.color.values[0].encoding == "rgb8" and raw.depth.values[0].encoding == "32FC1"
     for role, decode in (("color", images.color), ("depth", images.depth)):
         ours, theirs = raw.streams[role].values, usual.streams[role].values
         assert len(ours) == len(theirs) > 50
-        for one, other in zip(ours[::10], theirs[::10], strict=True):
-            np.testing.assert_array_equal(decode(one), decode(other))
+        for picture, other in zip(ours[::10], theirs[::10], strict=True):
+            np.testing.assert_array_equal(decode(picture), decode(other))
 
 
 def assert_same_episode(episode: Episode, usual: Episode) -> None:
@@ -96,12 +96,12 @@ def test_a_bag_of_rosbags(blind, params, tmp_path) -> None:
     assert_same_recording(read_recording(path, params.setup), blind[0], params)
 
 
-def assert_same_recording(found: Recording, path: Path, params) -> None:
+def assert_same_recording(recording: Recording, path: Path, params) -> None:
     usual = read_recording(path, params.setup)
-    assert found.losses == usual.losses == []
-    assert set(found.streams) == set(usual.streams)
+    assert recording.losses == usual.losses == []
+    assert set(recording.streams) == set(usual.streams)
     for role, stream in usual.streams.items():
-        np.testing.assert_array_equal(found.streams[role].stamp, stream.stamp)
-        assert found.streams[role].topic == stream.topic
+        np.testing.assert_array_equal(recording.streams[role].stamp, stream.stamp)
+        assert recording.streams[role].topic == stream.topic
         if isinstance(stream.values, np.ndarray):
-            np.testing.assert_array_equal(found.streams[role].values, stream.values)
+            np.testing.assert_array_equal(recording.streams[role].values, stream.values)

@@ -38,18 +38,20 @@ def recording(joins: dict, wrench: str = "ft", pose: str = "base", depth: str = 
 
 
 def test_a_sensor_on_the_hand() -> None:
-    found = geometry_of(recording({**JOINED, **ON_HAND}), SETUP)
-    assert not found.sensor_is_fixed and "hand_tcp" in found.sources["wrench"]
-    np.testing.assert_allclose(found.sensor.apply([0, 0, 0.1]), [0, 0, 0], atol=1e-12)
-    np.testing.assert_allclose(found.camera.translation, [np.cos(np.pi / 6), -0.5, 0], atol=1e-12)
+    geometry = geometry_of(recording({**JOINED, **ON_HAND}), SETUP)
+    assert not geometry.sensor_is_fixed and "hand_tcp" in geometry.sources["wrench"]
+    np.testing.assert_allclose(geometry.sensor.apply([0, 0, 0.1]), [0, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(
+        geometry.camera.translation, [np.cos(np.pi / 6), -0.5, 0], atol=1e-12
+    )
 
 
 def test_a_depth_camera_of_its_own() -> None:
     apart = {**JOINED, **ON_HAND, ("optical", "depth_optical"): [-0.015, 0, 0]}
-    found = geometry_of(recording(apart, depth="depth_optical"), SETUP)
-    np.testing.assert_allclose(found.color.translation, [-0.015, 0, 0])
+    geometry = geometry_of(recording(apart, depth="depth_optical"), SETUP)
+    np.testing.assert_allclose(geometry.color.translation, [-0.015, 0, 0])
     registered = geometry_of(recording({**JOINED, **ON_HAND}), SETUP).camera
-    np.testing.assert_allclose(found.camera.apply([0, 0, 1]), registered.apply([-0.015, 0, 1]))
+    np.testing.assert_allclose(geometry.camera.apply([0, 0, 1]), registered.apply([-0.015, 0, 1]))
 
 
 def test_the_tip_link_is_the_frame_that_moves() -> None:
@@ -62,17 +64,17 @@ def test_the_tip_link_is_the_frame_that_moves() -> None:
 
 
 def test_a_wrench_in_the_base() -> None:
-    found = geometry_of(recording(JOINED, wrench="base"), SETUP)
-    assert found.sensor_is_fixed
-    np.testing.assert_allclose(found.sensor.rotation.as_matrix(), TURN.as_matrix())
+    geometry = geometry_of(recording(JOINED, wrench="base"), SETUP)
+    assert geometry.sensor_is_fixed
+    np.testing.assert_allclose(geometry.sensor.rotation.as_matrix(), TURN.as_matrix())
 
 
 def test_a_wrench_and_a_pose_without_frames_are_the_hands_and_the_bases() -> None:
     setup = SimpleNamespace(base_to_fork=(0, 1, 0, 0, 0, 0, 1), camera_to_fork=None, tip_link=None)
-    found = geometry_of(recording({("fork", "optical"): [1, 0, 0]}, wrench="", pose=""), setup)
-    assert not found.sensor_is_fixed
-    assert found.sources["base_to_fork"] == "setup.base_to_fork"
-    np.testing.assert_allclose(found.base.translation, [0, -1, 0])
+    geometry = geometry_of(recording({("fork", "optical"): [1, 0, 0]}, wrench="", pose=""), setup)
+    assert not geometry.sensor_is_fixed
+    assert geometry.sources["base_to_fork"] == "setup.base_to_fork"
+    np.testing.assert_allclose(geometry.base.translation, [0, -1, 0])
 
 
 PLACES = st.lists(st.floats(-2, 2), min_size=3, max_size=3)
@@ -93,10 +95,10 @@ def matrix(pose: tuple) -> np.ndarray:
 
 def placed(edges: dict, **given):
     """The geometry with edges (parent, child): pose in /tf_static, and poses of `setup`."""
-    one = recording({})
+    bag = recording({})
     for edge, pose in edges.items():
-        one.transforms.add(*edge, Transform.of(pose))
-    return geometry_of(one, SimpleNamespace(**(vars(SETUP) | given)))
+        bag.transforms.add(*edge, Transform.of(pose))
+    return geometry_of(bag, SimpleNamespace(**(vars(SETUP) | given)))
 
 
 @settings(deadline=None, max_examples=150)
@@ -114,7 +116,7 @@ def test_any_two_of_base_camera_and_fork_give_the_third(fork, camera) -> None:
         {("optical", "base"): pose(np.linalg.inv(of_camera))},
     )
     seen = pose(in_camera)
-    for found in (
+    for geometry in (
         placed(base_camera, base_to_fork=fork),
         placed(camera_base, base_to_fork=fork),
         placed(base_camera, camera_to_fork=seen),
@@ -125,11 +127,11 @@ def test_any_two_of_base_camera_and_fork_give_the_third(fork, camera) -> None:
         placed(base_camera | {("base", "fork"): fork}),
         placed({("fork", "base"): pose(np.linalg.inv(in_base)), ("optical", "fork"): seen}),
     ):
-        for transform, wanted in ((found.base, in_base), (found.camera, in_camera)):
+        for transform, wanted in ((geometry.base, in_base), (geometry.camera, in_camera)):
             whole = np.eye(4)
             whole[:3, :3], whole[:3, 3] = transform.rotation.as_matrix(), transform.translation
             np.testing.assert_allclose(whole @ wanted, np.eye(4), atol=1e-9)
-        assert found.loop is None
+        assert geometry.loop is None
     whole = placed(base_camera, base_to_fork=fork, camera_to_fork=seen)
     assert whole.loop is not None and whole.loop.closed
     assert whole.loop.distance < 1e-6 and whole.loop.angle < 1e-6
@@ -141,21 +143,21 @@ def test_three_poses_that_contradict_each_other_say_by_how_much() -> None:
     seen = (0.0, 1.0, 0.0, 0, 0, 0, 1)  # of the fork in the camera
     for off, turn, closed in ((0.012, 0.5, True), (0.05, 0.0, False), (0.0, 2.5, False)):
         turned = Rotation.from_euler("z", turn, degrees=True).as_quat()
-        found = placed(edges, base_to_fork=(0.7 + off, 0, 0.4, *turned), camera_to_fork=seen)
-        assert found.loop is not None and found.loop.closed is closed
-        assert found.loop.distance == pytest.approx(off, abs=1e-12)
-        assert f"lies {1e3 * off:.1f} mm and {turn:.2f} degrees off" in str(found.loop)
-        assert found.sources["loop"] == str(found.loop)
+        geometry = placed(edges, base_to_fork=(0.7 + off, 0, 0.4, *turned), camera_to_fork=seen)
+        assert geometry.loop is not None and geometry.loop.closed is closed
+        assert geometry.loop.distance == pytest.approx(off, abs=1e-12)
+        assert f"lies {1e3 * off:.1f} mm and {turn:.2f} degrees off" in str(geometry.loop)
+        assert geometry.sources["loop"] == str(geometry.loop)
         np.testing.assert_allclose(
-            found.base.inverse().translation, (0.7 + off, 0, 0.4), atol=1e-12
+            geometry.base.inverse().translation, (0.7 + off, 0, 0.4), atol=1e-12
         )
 
 
 def test_a_base_without_a_name_is_not_joined_to_a_camera_without_one() -> None:
-    one = recording({}, pose="")
-    one.color.frame = ""
+    bag = recording({}, pose="")
+    bag.color.frame = ""
     with pytest.raises(UserError, match="messages name no frame"):
-        geometry_of(one, SimpleNamespace(**(vars(SETUP) | {"base_to_fork": FORK_AHEAD})))
+        geometry_of(bag, SimpleNamespace(**(vars(SETUP) | {"base_to_fork": FORK_AHEAD})))
 
 
 FORK_AHEAD = (0.7, 0, 0.4, 0, 0, 0, 1)

@@ -32,7 +32,7 @@ def test_a_twist_alone(blind, params, usual) -> None:
     step = 1e-5
     velocity = [(truth.hand(x + step) - truth.hand(x - step)) / (2 * step) for x in t]
     container = read_container(blind[0])
-    at = next(i for i, one in enumerate(container.channels) if "Pose" in one.schema.name)
+    at = next(i for i, channel in enumerate(container.channels) if "Pose" in channel.schema.name)
     payloads = []
     for stamp, row in zip(usual.pose.stamp, base.apply(velocity), strict=True):
         time = {"sec": int(stamp) // 10**9, "nanosec": int(stamp) % 10**9}
@@ -44,9 +44,9 @@ def test_a_twist_alone(blind, params, usual) -> None:
     times = container.channels[at].log_times
     container.channels[at] = Channel("/arm", schema, "json", times, payloads)
     start = {"start_pose": tuple(usual.pose.values[0])}
-    found = recording_of(container, params.setup.model_copy(update=start))
-    assert found.pose.topic == found.twist.topic == "/arm"
-    ours, theirs = signals(found, params), signals(usual, params)
+    recording = recording_of(container, params.setup.model_copy(update=start))
+    assert recording.pose.topic == recording.twist.topic == "/arm"
+    ours, theirs = signals(recording, params), signals(usual, params)
     before = ours.time < ours.release_time - 0.05
     np.testing.assert_allclose(ours.position[before], theirs.position[before], atol=2e-5)
     leap = 0.06 * 0.5 / 200

@@ -49,15 +49,15 @@ def test_lost_and_irregular_samples_bend_nothing() -> None:
     path = np.stack([np.polyval(axis, t) for axis in bends], axis=1)
     times = np.linspace(0.2, 2.8, 50)
     wanted = np.stack([np.polyval(np.polyder(axis, 2), times) for axis in bends], axis=1)
-    found = motion(t, path).acceleration(times, CENTER)
-    np.testing.assert_allclose(found, wanted, rtol=1e-5, atol=1e-3)
+    acceleration = motion(t, path).acceleration(times, CENTER)
+    np.testing.assert_allclose(acceleration, wanted, rtol=1e-5, atol=1e-3)
 
 
 def test_a_hand_that_is_not_seen_rests() -> None:
     t = np.arange(0, 1, 0.01)
     hand = motion(t, 0.5 * 3.0 * t[:, None] ** 2 * [1.0, 0, 0])
-    found = hand.acceleration(np.array([-0.5, 0.5, 2.0]), CENTER)
-    np.testing.assert_allclose(found[:, 0], [0, 3, 0], atol=1e-6)
+    acceleration = hand.acceleration(np.array([-0.5, 0.5, 2.0]), CENTER)
+    np.testing.assert_allclose(acceleration[:, 0], [0, 3, 0], atol=1e-6)
 
 
 def test_too_few_samples_are_refused() -> None:

@@ -40,7 +40,7 @@ def test_each_pull_is_as_its_truth_and_as_in_a_file_of_its_own(
 ) -> None:
     path, shifts = both
     together, refused = build_episodes(path, "band1", params)
-    assert [one.metadata["input"]["pull"] for one in together] == [1, 2] and not refused
+    assert [result.metadata["input"]["pull"] for result in together] == [1, 2] and not refused
     for episode, (alone, truth), shift in zip(together, (seen, seen_again), shifts, strict=True):
         assert episode.metadata["input"]["file"] == path.name
         start = (episode.metadata["input"]["start_ns"] - START) * 1e-9 - shift  # of the window
@@ -53,25 +53,28 @@ def test_each_pull_is_as_its_truth_and_as_in_a_file_of_its_own(
         hand = np.array([truth.hand(t) for t in time])
         np.testing.assert_allclose(episode.position[calm], hand[calm], atol=3e-4)
 
-        own = build_episodes(alone, "band1", params)[0][0]
-        assert (own.metadata["input"]["file"], own.metadata["input"]["pull"]) == (alone.name, 1)
-        before = (own.metadata["input"]["start_ns"] - START) * 1e-9
-        assert start + episode.release_time == pytest.approx(before + own.release_time, abs=2e-5)
+        single = build_episodes(alone, "band1", params)[0][0]
+        assert (single.metadata["input"]["file"], single.metadata["input"]["pull"]) == (
+            alone.name,
+            1,
+        )
+        before = (single.metadata["input"]["start_ns"] - START) * 1e-9
+        assert start + episode.release_time == pytest.approx(before + single.release_time, abs=2e-5)
         stamps = start + episode.cloud_time
-        shared = [np.abs(before + own.cloud_time - stamp).min() < 1e-6 for stamp in stamps]
+        shared = [np.abs(before + single.cloud_time - stamp).min() < 1e-6 for stamp in stamps]
         assert np.mean(shared) > 0.95  # the same pictures
 
 
 def test_a_shallow_pull_beside_a_deep_one_is_no_slip(both, params) -> None:
     """The fingers open, and the hand is free. Between the two it serves both."""
     whole = Pull.of(read_recording(both[0], params.setup), params.setup)
-    recording, found = whole.recording, whole.releases
+    recording, releases = whole.recording, whole.releases
     wanted = [DEEP.release, SHALLOW.release + both[1][1]]
-    np.testing.assert_allclose(found, wanted, atol=0.01)
-    found = pulls_of(whole)
-    assert [(one.number, one.count) for one in found] == [(1, 2), (2, 2)]
-    assert {one.recording.origin for one in found} == {recording.origin}
-    first, second = ([one.force_time[k] for k in (0, -1)] for one in found)
+    np.testing.assert_allclose(releases, wanted, atol=0.01)
+    pulls = pulls_of(whole)
+    assert [(pull.number, pull.count) for pull in pulls] == [(1, 2), (2, 2)]
+    assert {pull.recording.origin for pull in pulls} == {recording.origin}
+    first, second = ([pull.force_time[k] for k in (0, -1)] for pull in pulls)
     assert first[0] == 0 and second[1] == recording.wrench.seconds(recording.origin)[-1]
     assert DEEP.release < second[0] < first[1] < both[1][1] + SHALLOW.grasp  # they share it
 
@@ -92,8 +95,8 @@ def test_a_pull_that_cannot_be_used_is_named_and_the_others_are_used(
     """The second one's pictures are black."""
     path = tmp_path / "half.mcap"
     joined(path, [seen[0], blind_bag(tmp_path, SHALLOW)])
-    found, refused = process_pulls(path, params.bands["band1"], params)
-    assert [done.pull.number for done in found] == [1]
+    results, refused = process_pulls(path, params.bands["band1"], params)
+    assert [done.pull.number for done in results] == [1]
     (line,) = map(str, refused)
     assert line.startswith(f"{path}: pull 2 of 2: ") and "empty mask" in line and "\n" not in line
 
@@ -110,12 +113,12 @@ def test_a_band_that_slips_out_between_two_pulls_is_a_pull_that_cannot_be_used(
     path = tmp_path / "slipped.mcap"
     closed = blind_bag(tmp_path, change=edit(gripper=stay))
     joined(path, [seen[0], closed, seen[0]])
-    found, refused = process_pulls(path, params.bands["band1"], params)
-    assert [done.pull.number for done in found] == [1, 3]
+    results, refused = process_pulls(path, params.bands["band1"], params)
+    assert [done.pull.number for done in results] == [1, 3]
     assert "pull 2 of 3: the force drops at" in str(refused[0])
     assert "gripper stays closed" in str(refused[0])
     alone = process_pulls(seen[0], params.bands["band1"], params)[0][0].signals
-    for done in found:
+    for done in results:
         np.testing.assert_allclose(done.signals.facts.bias, alone.facts.bias, atol=0.02)
 
 

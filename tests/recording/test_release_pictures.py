@@ -21,23 +21,23 @@ def pull(seen, params) -> Pull:
 
 @pytest.mark.parametrize("late", [-0.2, -0.06, 0.0, 0.06, 0.2])
 def test_the_delay_is_between_both_ends(pull, params, late) -> None:
-    found = release_pictures(pull.shifted(camera=-late), params.setup.fork_width)
-    assert found.earliest <= late <= found.latest
-    assert found.latest - found.earliest < 1.3 * pull.recording.depth.period + 0.02
+    pictures = release_pictures(pull.shifted(camera=-late), params.setup.fork_width)
+    assert pictures.earliest <= late <= pictures.latest
+    assert pictures.latest - pictures.earliest < 1.3 * pull.recording.depth.period + 0.02
     if abs(late) < 0.001:
-        assert found.beyond == 0
-        assert not list(of_release(replace(found, repeated=())))
+        assert pictures.beyond == 0
+        assert not list(of_release(replace(pictures, repeated=())))
     if abs(late) > 0.1:
-        assert found.beyond > 0
-        assert [one.about for one in of_release(found)][-1:] == ["release_pictures"]
+        assert pictures.beyond > 0
+        assert [finding.about for finding in of_release(pictures)][-1:] == ["release_pictures"]
 
 
 def test_what_the_pictures_show_goes_before_the_hand(pull, params) -> None:
     """A camera that is 0.2 s late is nearly right after the correction, or said to be unclear."""
-    moved, found = correct_delays(pull.shifted(camera=-0.2), params)
+    moved, estimates = correct_delays(pull.shifted(camera=-0.2), params)
     left = (moved.recording.depth.stamp - pull.recording.depth.stamp) * 1e-9
-    assert abs(left).max() < 3 * (found.camera.left or 0.0) + 1e-9
-    assert found.camera.applied
+    assert abs(left).max() < 3 * (estimates.camera.left or 0.0) + 1e-9
+    assert estimates.camera.applied
 
 
 def test_black_pictures_show_nothing(blind, params) -> None:
@@ -62,12 +62,14 @@ def test_a_band_that_is_never_let_go_is_refused(pull, params) -> None:
     depth = pull.recording.depth
     since = depth.seconds(pull.recording.origin) - pull.release.time
     held = depth.values[int(np.searchsorted(since, -0.1))]
-    values = [held if time > -0.1 else one for time, one in zip(since, depth.values, strict=True)]
+    values = [
+        held if time > -0.1 else picture for time, picture in zip(since, depth.values, strict=True)
+    ]
     frozen = replace(pull.recording, depth=replace(depth, values=values))
-    found = release_pictures(replace(pull, recording=frozen), params.setup.fork_width)
-    assert found.never and found.beyond == 0 and found.frozen
-    for one in (found, replace(found, repeated=())):
-        (message,) = of_release(one)
+    pictures = release_pictures(replace(pull, recording=frozen), params.setup.fork_width)
+    assert pictures.never and pictures.beyond == 0 and pictures.frozen
+    for case in (pictures, replace(pictures, repeated=())):
+        (message,) = of_release(case)
         assert message.refused
 
 
@@ -76,6 +78,6 @@ def test_impossible_and_smeared_pictures_are_said() -> None:
     late = replace(SOUND, drawn=0.06, gone=0.09, earliest=0.045, latest=0.09)
     again = replace(SOUND, again=(0.15,))
     smeared = replace(SOUND, faded=(0.4, 0.3, 0.1))
-    message = [one.about for odd in (late, again, smeared) for one in of_release(odd)]
+    message = [finding.about for odd in (late, again, smeared) for finding in of_release(odd)]
     assert message == ["release_pictures", "release_pictures", "smeared_pictures"]
     assert not list(of_release(SOUND)) and np.isclose(SOUND.error, 0.05 / np.sqrt(12))

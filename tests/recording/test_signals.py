@@ -31,21 +31,21 @@ def signals(played: Played, params, tool=None, recording=None, inertia=None):
     return signals_of(Pull(recording, played.geometry()), params, inertia)
 
 
-def off(played: Played, found) -> np.ndarray:
+def off(played: Played, result) -> np.ndarray:
     """Error of the force [N], (T,), where no kink of the truth is smeared by the low pass."""
     truth = played.truth
-    t = found.time + (found.origin - START) * 1e-9
+    t = result.time + (result.origin - START) * 1e-9
     kinks = [0.4, truth.grasp, 0.6, truth.lifted, truth.release]  # of the acceleration, too
     calm = np.all([np.abs(t - kink) > 0.06 for kink in kinks], axis=0)
     wanted = np.array([truth.force(x) for x in t])
-    return np.linalg.norm(found.force - wanted, axis=1)[calm]
+    return np.linalg.norm(result.force - wanted, axis=1)[calm]
 
 
 def band_alone(played: Played, params, inertia, recording=None):
     """Signals without the tool's inertia, which are the band's force."""
-    found = signals(played, params, recording=recording, inertia=inertia)
-    assert off(played, found).max() < 0.25 and np.median(off(played, found)) < 0.02
-    return found
+    result = signals(played, params, recording=recording, inertia=inertia)
+    assert off(played, result).max() < 0.25 and np.median(off(played, result)) < 0.02
+    return result
 
 
 @pytest.fixture(scope="module")
@@ -59,10 +59,10 @@ def test_a_turning_hand_asks_for_the_tool(turning, params) -> None:
 
 
 def test_a_turning_hand_with_its_tool_gives_the_bands_force(turning, params) -> None:
-    found = signals(turning, params, tool())
-    assert off(turning, found).max() < 0.15  # of 20 N; a kink where the band goes taut
-    assert np.median(off(turning, found)) < 0.02
-    assert found.facts.tool.mass == MASS and np.degrees(found.facts.turn) > 10
+    result = signals(turning, params, tool())
+    assert off(turning, result).max() < 0.15  # of 20 N; a kink where the band goes taut
+    assert np.median(off(turning, result)) < 0.02
+    assert result.facts.tool.mass == MASS and np.degrees(result.facts.turn) > 10
 
 
 def test_a_wrong_centre_of_mass_is_felt_where_the_hand_turns_fast(params) -> None:
@@ -85,8 +85,8 @@ def test_a_tool_that_nobody_told_of_is_felt(params) -> None:
     played = Played(mass=MASS, truth=Truth(noise=0.005))
     inertia = estimate_tool_inertia(Pull(played.recording(), played.geometry()), None)
     assert inertia.mass == pytest.approx(MASS, rel=0.03)
-    found = band_alone(played, params, inertia)
-    assert found.facts.tool.source == "its inertia"
+    result = band_alone(played, params, inertia)
+    assert result.facts.tool.source == "its inertia"
     summary = signals(played, params, tool(mass=0.0), inertia=inertia)
     given = ToolFacts(0.0, list(TOOL), "setup.tool")
     assert summary.facts.tool == given
@@ -135,22 +135,22 @@ class Leaving(Played):
 
 def test_the_weight_of_a_hand_that_turns_away_is_no_drift(params) -> None:
     played = Leaving(mass=MASS)
-    found = signals(played, params)
-    assert found.facts.drift == [0, 0, 0]
-    hold = np.array(found.facts.hold_force) - played.truth.force(played.truth.release - 0.1)
+    result = signals(played, params)
+    assert result.facts.drift == [0, 0, 0]
+    hold = np.array(result.facts.hold_force) - played.truth.force(played.truth.release - 0.1)
     assert np.linalg.norm(hold) < 0.05
 
 
 def test_a_sensor_of_the_other_sign_feels_its_tool_so_too(params) -> None:
     played = Played(turn=0.6, mass=MASS, truth=Truth(sign=-1.0))
-    found = signals(played, params, tool())
-    assert found.facts.flipped and off(played, found).max() < 0.15
+    result = signals(played, params, tool())
+    assert result.facts.flipped and off(played, result).max() < 0.15
 
 
 def test_a_wrench_in_the_base_of_a_hand_that_turns(params) -> None:
     played = Played(turn=0.6, mass=MASS, fixed=True)
-    found = signals(played, params, tool(center=tuple(played.center_in_hand)))
-    assert off(played, found).max() < 0.15
+    result = signals(played, params, tool(center=tuple(played.center_in_hand)))
+    assert off(played, result).max() < 0.15
 
 
 def test_a_force_without_its_tool_may_turn_with_mass_zero(params) -> None:
@@ -171,10 +171,10 @@ def test_gaps_are_said_and_long_ones_refused(params) -> None:
             with pytest.raises(UserError, match=f"{whole.topic} is missing for 0.40 s"):
                 signals(played, params, recording=recording)
         else:
-            found = signals(played, params, recording=recording)
-            assert found.facts.longest_gap[whole.topic] == pytest.approx(length, abs=0.005)
-            hand = played.hand(found.time + (found.origin - START) * 1e-9)
-            assert np.abs(found.position - hand).max() < 0.012  # a T^2 / 8, a = 2.4 m/s^2
+            result = signals(played, params, recording=recording)
+            assert result.facts.longest_gap[whole.topic] == pytest.approx(length, abs=0.005)
+            hand = played.hand(result.time + (result.origin - START) * 1e-9)
+            assert np.abs(result.position - hand).max() < 0.012  # a T^2 / 8, a = 2.4 m/s^2
 
 
 def test_irregular_stamps_give_the_same_velocity(params) -> None:

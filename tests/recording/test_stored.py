@@ -32,8 +32,8 @@ def test_what_is_kept_is_what_would_be_made(layout, seen, params, monkeypatch) -
     (made,), _ = build_episodes(seen[0], "band1", params)
     made.save(layout.root / "made")
     monkeypatch.setattr("pipeline.recording.build.build_episodes", never)
-    (found,), refused = stored.episodes_of(seen[0], "band1", params, layout)
-    found.save(layout.root / "found")
+    (episode,), refused = stored.episodes_of(seen[0], "band1", params, layout)
+    episode.save(layout.root / "found")
     assert files(layout.root / "found") == files(layout.root / "made") and not refused
 
 

@@ -114,37 +114,37 @@ def offsets(shift=(0, 0, 0), turn=(0, 0, 0)) -> np.ndarray:
     ],
 )
 def test_a_misplaced_camera_is_measured(shift, turn) -> None:
-    found = measure_tips(*drawn(shift, turn), EYE, DOWN)
+    tips = measure_tips(*drawn(shift, turn), EYE, DOWN)
     truth = offsets(shift, turn)
-    np.testing.assert_allclose(found.offsets, truth, atol=0.0015)
-    assert np.all(np.abs(found.offsets - truth) < 3 * found.errors)
+    np.testing.assert_allclose(tips.offsets, truth, atol=0.0015)
+    assert np.all(np.abs(tips.offsets - truth) < 3 * tips.errors)
     # The correction puts the tips, as they are shown, where they are.
-    np.testing.assert_allclose(found.correction.apply(TIPS + truth), TIPS, atol=0.0015)
-    assert np.linalg.norm(found.hand) < 3 * np.linalg.norm(found.hand_error)
-    assert found.residual < NOISE
+    np.testing.assert_allclose(tips.correction.apply(TIPS + truth), TIPS, atol=0.0015)
+    assert np.linalg.norm(tips.hand) < 3 * np.linalg.norm(tips.hand_error)
+    assert tips.residual < NOISE
 
 
 def test_a_misplaced_hand_is_no_misplaced_camera() -> None:
-    found = measure_tips(*drawn(hand_shift=(0.008, 0, 0)), EYE, DOWN)
-    assert found.hand[0] == pytest.approx(-0.008, abs=0.003)
-    assert np.all(np.abs(found.hand + [0.008, 0, 0]) < 3 * found.hand_error)
-    np.testing.assert_allclose(found.offsets, 0, atol=0.0015)
+    tips = measure_tips(*drawn(hand_shift=(0.008, 0, 0)), EYE, DOWN)
+    assert tips.hand[0] == pytest.approx(-0.008, abs=0.003)
+    assert np.all(np.abs(tips.hand + [0.008, 0, 0]) < 3 * tips.hand_error)
+    np.testing.assert_allclose(tips.offsets, 0, atol=0.0015)
 
 
 def test_the_seen_side_is_not_taken_for_the_middle() -> None:
     """A camera on the other side of the band moves the seen side by millimetres."""
     for eye in (EYE, np.array([-0.75, 0.28, 0.42])):
-        found = measure_tips(*drawn(eye=eye), eye, DOWN)
-        assert np.abs(found.offsets[:, 0]).max() < 0.0015
+        tips = measure_tips(*drawn(eye=eye), eye, DOWN)
+        assert np.abs(tips.offsets[:, 0]).max() < 0.0015
 
 
 @pytest.mark.parametrize("stiffness", [0.008, 0.020])
 def test_a_band_that_bends_out_of_its_clamps(stiffness) -> None:
     """Its line passes up to 2 cm below the tip; that is no misplaced camera."""
     shift = (0.0, 0.004, 0.003)
-    found = measure_tips(*drawn(shift, stiffness=stiffness), EYE, DOWN)
-    np.testing.assert_allclose(found.offsets, offsets(shift), atol=0.003)
-    assert np.all(np.abs(found.offsets - offsets(shift)) < 3 * found.errors)
+    tips = measure_tips(*drawn(shift, stiffness=stiffness), EYE, DOWN)
+    np.testing.assert_allclose(tips.offsets, offsets(shift), atol=0.003)
+    assert np.all(np.abs(tips.offsets - offsets(shift)) < 3 * tips.errors)
 
 
 def test_too_little_of_the_drawn_band_says_nothing() -> None:
@@ -181,9 +181,9 @@ def test_a_misplaced_tf_static_is_measured(checked, params, tmp_path) -> None:
     path = tmp_path / "misplaced.mcap"
     write_bag(path, rate=500, change=misplaced(np.array(shift), np.array(turn)))
     done, truth = process(path, params.bands["band1"], params), offsets(shift, turn)
-    found = done.tips.offsets
-    np.testing.assert_allclose(found - checked.tips.offsets, truth, atol=0.0007)
-    assert np.all(np.abs(found - truth) < 3 * done.tips.errors)
+    measured = done.tips.offsets
+    np.testing.assert_allclose(measured - checked.tips.offsets, truth, atol=0.0007)
+    assert np.all(np.abs(measured - truth) < 3 * done.tips.errors)
     assert [caution for caution in done.cautions if caution.about == "extrinsics"]
     assert not [caution for caution in checked.cautions if caution.about == "extrinsics"]
 
@@ -198,10 +198,10 @@ def test_a_misplaced_tf_static_is_measured(checked, params, tmp_path) -> None:
 def test_a_scale_of_depth_is_told_from_a_misplaced_camera(factor) -> None:
     scene, times, clouds = drawn()
     seen = [EYE + factor * (cloud - EYE) for cloud in clouds]
-    found = measure_tips(scene, times, seen, EYE, DOWN)
-    assert found.is_off and found.lens.kind == "depth"
-    assert found.lens.factor == pytest.approx(factor, abs=3 * found.lens.error)
+    tips = measure_tips(scene, times, seen, EYE, DOWN)
+    assert tips.is_off and tips.lens.kind == "depth"
+    assert tips.lens.factor == pytest.approx(factor, abs=3 * tips.lens.error)
     across = np.cross(EYE, [0.0, 0.0, 1.0])
     moved = [cloud + 0.012 * across / np.linalg.norm(across) for cloud in clouds]
-    found = measure_tips(scene, times, moved, EYE, DOWN)
-    assert found.is_off and found.lens is None
+    tips = measure_tips(scene, times, moved, EYE, DOWN)
+    assert tips.is_off and tips.lens is None

@@ -23,10 +23,10 @@ def test_a_sensor_that_is_zeroed(at, size) -> None:
     """While free, slack or drawn: the force is whole again, with the zero of the end."""
     step = size * np.array([0.6, -0.64, 0.48])
     force = made()
-    found, steps = zeroed(T, force + (T > at)[:, None] * step)
-    assert [one.time for one in steps] == [pytest.approx(at, abs=0.002)]
+    result, steps = zeroed(T, force + (T > at)[:, None] * step)
+    assert [jump.time for jump in steps] == [pytest.approx(at, abs=0.002)]
     np.testing.assert_allclose(steps[0].size, step, atol=0.1)
-    np.testing.assert_allclose(found.mean(axis=0), (force + step).mean(axis=0), atol=0.1)
+    np.testing.assert_allclose(result.mean(axis=0), (force + step).mean(axis=0), atol=0.1)
 
 
 def test_a_band_that_slips_and_a_hand_that_jerks_are_left() -> None:
@@ -34,8 +34,8 @@ def test_a_band_that_slips_and_a_hand_that_jerks_are_left() -> None:
         force = made(seed=seed)
         slips = force - 5.0 * ((T > 6.5) & (T < 8))[:, None] * WAY
         jerks = force + 1.0 * ((T > 0.2) & (T < 0.4))[:, None] * WAY
-        for one in (force, slips, jerks):
-            assert zeroed(T, one) == (one, [])
+        for case in (force, slips, jerks):
+            assert zeroed(T, case) == (case, [])
 
 
 @pytest.mark.parametrize("mass", [0.3, 1.0, 2.0])
@@ -54,7 +54,7 @@ def test_a_hand_that_stops_is_no_new_zero(mass) -> None:
     assert zeroed(T, force, hand)[1] == []
     assert bool(zeroed(T, force)[1]) == (mass > 0.5)  # as it looks without the path
     at_rest = force + (T > 7.6)[:, None] * (4 * step)
-    assert [one.time for one in zeroed(T, at_rest, hand)[1]] == [pytest.approx(7.6, abs=0.002)]
+    assert [jump.time for jump in zeroed(T, at_rest, hand)[1]] == [pytest.approx(7.6, abs=0.002)]
 
 
 def course(shape) -> tuple:
@@ -64,18 +64,18 @@ def course(shape) -> tuple:
 
 @pytest.mark.parametrize("size", [0.0, 0.3, 2.0, 5.0])
 def test_a_steady_drift_is_known_of_any_size(size) -> None:
-    found = course(lambda t: size * t / 10)
-    assert found.steady
-    np.testing.assert_allclose(10 * found.rate, size * WAY, atol=0.02)
+    drift = course(lambda t: size * t / 10)
+    assert drift.steady
+    np.testing.assert_allclose(10 * drift.rate, size * WAY, atol=0.02)
 
 
 @pytest.mark.parametrize("size", [0.5, 1.0, 3.0])
 def test_a_zero_that_warms_up_or_does_not_return_is_no_drift(size) -> None:
     """1 - exp(-t / 1.5 s), and a return error after the load."""
     for shape in (lambda t: size * (1 - np.exp(-t / 1.5)), lambda t: size * (t > 8)):
-        found = course(shape)
-        assert not found.steady and not found.rate.any()
-        assert np.linalg.norm(found.change) == pytest.approx(size, rel=0.35)
+        drift = course(shape)
+        assert not drift.steady and not drift.rate.any()
+        assert np.linalg.norm(drift.change) == pytest.approx(size, rel=0.35)
 
 
 def test_a_small_return_error_is_no_drift_either() -> None:

@@ -46,14 +46,14 @@ def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorde
     episode = build_episodes(path, "band1", quick)[0][0]
     start = 1e-9 * (episode.metadata["input"]["start_ns"] - EPOCH)
     nearest = np.abs(happened.seen[:, None] - start - episode.cloud_time).argmin(axis=0)
-    about = string.sizes, string.diameter / 2, episode.camera, quick.rig.camera.depth_noise
-    clouds = [visible(happened.lines[at], *about, rng) for at in nearest]
+    arguments = string.sizes, string.diameter / 2, episode.camera, quick.rig.camera.depth_noise
+    clouds = [visible(happened.lines[at], *arguments, rng) for at in nearest]
     rig = replace(episode, clouds=clouds)
 
     cutoff = cutoff_hz(quick.force.cutoff, quick.force.cutoff_unit)
     noise = quick.rig.wrench.noise
-    own = own_law_episode(sling, rig, TRUTH, cutoff=cutoff, force_noise=noise)
-    at_truth = evaluator(quick, sling, own)
+    simulated = own_law_episode(sling, rig, TRUTH, cutoff=cutoff, force_noise=noise)
+    at_truth = evaluator(quick, sling, simulated)
     own_loss = at_truth(at_truth.box.unit_of(TRUTH)).total[0]  # its least is no more
     best = evaluations_of(quick, METHOD, evaluator(quick, sling, rig)).best()
     assert best["total"] > 3 * own_loss

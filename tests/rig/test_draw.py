@@ -15,11 +15,11 @@ from tests.project import with_
 
 
 def value_of(params: Params, key: str) -> float:
-    found: object = params.rig
+    value: object = params.rig
     for name in key.split("."):
-        found = getattr(found, name)
-    assert isinstance(found, float)
-    return found
+        value = getattr(value, name)
+    assert isinstance(value, float)
+    return value
 
 
 def test_each_recording_has_its_own_within_the_ranges(params: Params) -> None:

@@ -77,13 +77,13 @@ def numbers(value: Any, name: str = "") -> Iterator[str]:
     if isinstance(value, Section):
         value = dict(value)
     if isinstance(value, tuple):
-        value = {str(i): one for i, one in enumerate(value)}
+        value = {str(i): part for i, part in enumerate(value)}
     if not isinstance(value, dict):
         if isinstance(value, int | float):
             yield name
         return
-    for key, one in value.items():
-        yield from numbers(one, f"{name}.{key}".lstrip("."))
+    for key, part in value.items():
+        yield from numbers(part, f"{name}.{key}".lstrip("."))
 
 
 def changed(value: Any, name: str) -> Any:
@@ -100,7 +100,7 @@ def changed(value: Any, name: str) -> Any:
 
 
 def expected(name: str) -> set[str]:
-    fits = [one for one in CHANGES if f"{name}.".startswith(f"{one}.")]
+    fits = [prefix for prefix in CHANGES if f"{name}.".startswith(f"{prefix}.")]
     assert fits, f"rig.{name}: say here what it changes"
     return CHANGES[max(fits, key=len)]
 
@@ -190,9 +190,9 @@ def test_each_number_changes_what_it_should(params, tmp_path, monkeypatch) -> No
     wrong = {}
     for name in numbers(rig):
         now = everything(changed(rig, name), "landing" in expected(name))
-        found = {topic for topic in now if now[topic] != before[topic]}
+        topics = {topic for topic in now if now[topic] != before[topic]}
         if FELT <= expected(name) and TF not in expected(name):
-            found -= PICTURE
-        if found != expected(name):
-            wrong[name] = found ^ expected(name)
+            topics -= PICTURE
+        if topics != expected(name):
+            wrong[name] = topics ^ expected(name)
     assert not wrong, "changed, or should have"

@@ -103,10 +103,10 @@ class Dask:
                 stdout=file,
                 stderr=subprocess.STDOUT,
             )
-        found = until(
+        match = until(
             lambda: re.search(r"(?:Scheduler at|Start worker at): +(tcp://\S+)", log.read_text())
         )
-        return found[1]
+        return match[1]
 
     def stop(self) -> None:
         for process in reversed(self.processes.values()):

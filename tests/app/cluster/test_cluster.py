@@ -32,8 +32,8 @@ def test_two_workers_with_copies_of_their_own_make_everything(several: Several) 
     head, flow = several.head, ("-c", "from app.cli import main; main()", "flow")
     for copy in (several.plain, several.gpu):
         (copy.folder / "wait").touch()
-    with ThreadPoolExecutor(1) as one:
-        done = one.submit(head, sys.executable, *flow, "--cluster", several.address)
+    with ThreadPoolExecutor(1) as pool:
+        done = pool.submit(head, sys.executable, *flow, "--cluster", several.address)
         try:
             until(lambda: several.plain.ran and several.gpu.ran, 120)  # both are at work
         finally:
@@ -41,18 +41,18 @@ def test_two_workers_with_copies_of_their_own_make_everything(several: Several) 
                 (copy.folder / "wait").unlink()
         done.result()
     lines = head.errors.splitlines()
-    outputs = [one[0] for copy in (several.plain, several.gpu, head) for one in copy.ran]
+    outputs = [row[0] for copy in (several.plain, several.gpu, head) for row in copy.ran]
     assert sorted(outputs) == ["data/search/a", "data/search/b", "data/train/b", "report.md"]
-    assert [one[0] for one in several.plain.ran] in (["data/search/a"], ["data/search/b"])
-    trained = [(one[0], one[2]) for one in several.gpu.ran if "train" in one[0]]
+    assert [row[0] for row in several.plain.ran] in (["data/search/a"], ["data/search/b"])
+    trained = [(row[0], row[2]) for row in several.gpu.ran if "train" in row[0]]
     assert trained == [("data/train/b", "cuda:7")]
-    assert [one[0] for one in head.ran] == ["report.md"]  # what Git keeps
+    assert [row[0] for row in head.ran] == ["report.md"]  # what Git keeps
     assert "train | makes data/train/b" in lines
     for copy in (several.plain, several.gpu):
         assert f" in {copy.folder}\n" in "\n".join(lines)
     # What DVC itself says of the head: nothing to do.
     assert "Running stage" not in head("dvc", "repro")
-    report = "".join(f"seed: 1\ndata/search/{one}\n" for one in "ab")
+    report = "".join(f"seed: 1\ndata/search/{letter}\n" for letter in "ab")
     assert (head.folder / "report.md").read_text() == f"{report}data/train/b\nreport.md\n"
     assert not list((head.folder / ".checkpoints").iterdir())
     # And a third copy can have it all.
@@ -74,9 +74,9 @@ def test_a_stage_whose_worker_is_killed_begins_anew_on_the_other(several: Severa
     lines: list[str] = []
     with (
         cluster.Cluster(several.head.folder, several.address) as place,
-        ThreadPoolExecutor(1) as one,
+        ThreadPoolExecutor(1) as pool,
     ):
-        done = one.submit(
+        done = pool.submit(
             place.run_stage, place.root, "search@a", environment={}, on_line=lines.append
         )
         first = until(lambda: next((name for name in copies if copies[name].ran), None))
@@ -120,8 +120,8 @@ def place(copies, monkeypatch) -> Iterator[Callable[[Path], cluster.Cluster]]:
             return made[-1]
 
         yield make
-        for one in made:
-            one.__exit__()
+        for cluster_i in made:
+            cluster_i.__exit__()
 
 
 def run(place: cluster.Cluster, name: str, **options) -> tuple[bool, list[str]]:
@@ -137,7 +137,7 @@ def test_in_a_shared_folder_nothing_travels(copies, place, tmp_path: Path) -> No
     tokens.mkdir()
     (tokens / "cluster-killed").touch()
     ran, lines = run(place, "search@a")
-    assert [one.name for one in tokens.iterdir()] == [Path(place.token).name]
+    assert [token.name for token in tokens.iterdir()] == [Path(place.token).name]
     assert ran and "makes data/search/a" in lines
     assert "search@a" in exchange.entries(head.folder, ("search@a",))
     assert not (tmp_path / "remote").exists()
@@ -148,7 +148,7 @@ def test_what_the_head_alone_has_is_pushed_first(copies, place) -> None:
     head("dvc", "repro", "-q", "search@b")
     ran, lines = run(place(other.folder), "train")
     assert ran
-    assert [one[0] for one in other.ran] == ["data/train/b"]
+    assert [row[0] for row in other.ran] == ["data/train/b"]
     assert any(line.startswith("no worker offers GPU") for line in lines)
     assert (head.folder / "data/train/b").read_text() == "seed: 1\ndata/search/b\ndata/train/b\n"
     assert "Running stage" not in head("dvc", "repro", "train")

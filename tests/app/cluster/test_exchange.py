@@ -67,8 +67,8 @@ def test_producers_follow_folders(head: Copy) -> None:
     needs = stages_of(head.folder)
     assert needs["report"].producers == ("search@a", "train")
     assert needs["train"].producers == ("search@b",)
-    assert {name for name, one in needs.items() if one.gpu} == {"train"}
-    assert {name for name, one in needs.items() if not one.travels} == {"report"}
+    assert {name for name, need in needs.items() if need.gpu} == {"train"}
+    assert {name for name, need in needs.items() if not need.travels} == {"report"}
 
 
 def test_entries_merged_at_once_are_all_there(head: Copy) -> None:
@@ -76,12 +76,12 @@ def test_entries_merged_at_once_are_all_there(head: Copy) -> None:
     names = [f"search@{number}" for number in range(8)]
     entry = {"cmd": "yes", "outs": [{"path": "on", "md5": "0" * 32, "size": 1}]}
     with ThreadPoolExecutor(4) as pool:
-        own = pool.submit(head, "dvc", "--wait-for-lock", "repro", "-q", "search@a")
+        repro = pool.submit(head, "dvc", "--wait-for-lock", "repro", "-q", "search@a")
         list(pool.map(lambda name: exchange.merge(head.folder, {name: entry}), names))
-        own.result(timeout=60)
-    found = YAML(typ="safe").load(head.folder / "dvc.lock")["stages"]
-    assert found.keys() == {*names, "search@a"}
-    assert all(found[name] == entry for name in names)
+        repro.result(timeout=60)
+    stages = YAML(typ="safe").load(head.folder / "dvc.lock")["stages"]
+    assert stages.keys() == {*names, "search@a"}
+    assert all(stages[name] == entry for name in names)
 
 
 def test_a_merged_lock_reads_as_one_of_dvcs(head: Copy) -> None:

@@ -41,10 +41,10 @@ def test_a_change_of_five_combined_deviations_is_said() -> None:
     deviations = [0.01, 0.02, 0.02]
     step = -5 * np.hypot(0.01, 0.02)
     for _ in range(200):
-        found = changes({"e": drawn(rng, [12, 12 + step, 12 + step], deviations)})
-        assert found and found[0].earlier == 0 and found[0].ratio < 1
+        result = changes({"e": drawn(rng, [12, 12 + step, 12 + step], deviations)})
+        assert result and result[0].earlier == 0 and result[0].ratio < 1
     many = [changes({"e": drawn(rng, [12, 12, 12 + step], deviations)}) for _ in range(200)]
-    assert np.mean([newest(found) == 2 for found in many]) > 0.9
+    assert np.mean([newest(trial) == 2 for trial in many]) > 0.9
 
 
 def test_it_is_no_question_of_overlap() -> None:
@@ -52,18 +52,18 @@ def test_it_is_no_question_of_overlap() -> None:
     apart = 2.4 * np.sqrt(2) * 0.01  # tail 0.0164, as tables of the normal distribution have it
     assert apart < 2 * NINE_OF_TEN * 0.01 + 0.002
     pair = [value(12.0, 0.01), value(12.0 + apart, 0.01)]
-    (found,) = changes({"e": pair})
-    assert found.chance == pytest.approx(0.0164, abs=1e-4)
-    assert found.ratio == pytest.approx(np.exp(apart))
+    (change,) = changes({"e": pair})
+    assert change.chance == pytest.approx(0.0164, abs=1e-4)
+    assert change.ratio == pytest.approx(np.exp(apart))
     between = value(12.0 + apart / 2, 0.01)
     assert changes({"e": [*pair, between], "d": [pair[0]] * 3}) == []
 
 
 def test_the_surest_comes_first_and_the_newest_are_those_at_the_end() -> None:
     logs = [0.0, 0.0, 0.5, 0.9, 0.9]
-    found = changes({"e": [value(log, 0.02) for log in logs]})
-    assert found[0].ratio == pytest.approx(np.exp(0.9))
-    assert len(found) == 8 and newest(found) == 3
+    result = changes({"e": [value(log, 0.02) for log in logs]})
+    assert result[0].ratio == pytest.approx(np.exp(0.9))
+    assert len(result) == 8 and newest(result) == 3
     assert newest([]) == 0
 
 
@@ -72,12 +72,14 @@ values = st.tuples(st.floats(-3, 3), st.floats(1e-3, 1.0))
 
 @given(st.lists(values, min_size=2, max_size=6), st.floats(1e-6, 1e6))
 def test_neither_units_nor_the_direction_of_time_matter(message, unit) -> None:
-    own = [value(*one) for one in message]
-    found = changes({"e": own})
-    assert all(one.chance < FALSE_ALARM and one.earlier < one.later for one in found)
-    other = [one.model_copy(update={"value": unit * one.value}) for one in own]
-    back = changes({"e": own[::-1]})
-    last = len(own) - 1
-    pairs = {(one.earlier, one.later) for one in found if one.chance < 0.99 * FALSE_ALARM}
+    series = [value(*pair) for pair in message]
+    result = changes({"e": series})
+    assert all(change.chance < FALSE_ALARM and change.earlier < change.later for change in result)
+    other = [reading.model_copy(update={"value": unit * reading.value}) for reading in series]
+    back = changes({"e": series[::-1]})
+    last = len(series) - 1
+    pairs = {
+        (change.earlier, change.later) for change in result if change.chance < 0.99 * FALSE_ALARM
+    }
     assert pairs <= {(change.earlier, change.later) for change in changes({"e": other})}
-    assert pairs <= {(last - one.later, last - one.earlier) for one in back}
+    assert pairs <= {(last - change.later, last - change.earlier) for change in back}

@@ -30,12 +30,12 @@ def settings(delivered) -> Settings:
 @pytest.fixture(scope="module")
 def episodes(settings) -> dict:
     """Two of one band and one of it 15 % softer, each with noise of its own; by content of file."""
-    found = {}
+    by_content = {}
     for seed, (name, young) in enumerate({"a": 2.2e5, "b": 2.2e5, "soft": 1.87e5}.items()):
         theta = Theta(young, 0.47, 2.4e-3, 0.7, 0.6, mooney_share=0.3, relaxation=0.01)
         arrays = rehearse(Model(BAND, theta, settings=settings), seed=seed)
-        found[name] = episode_from_arrays(**arrays, name="mine", settings=settings)
-    return found
+        by_content[name] = episode_from_arrays(**arrays, name="mine", settings=settings)
+    return by_content
 
 
 @pytest.fixture
@@ -46,8 +46,8 @@ def lab(tmp_path, settings, episodes, monkeypatch):
 
     def read_mcap(path, band, settings):
         read.append(path.name)
-        about = {"input": {"file": path.name, "start_ns": begins[path.name]}}
-        return [replace(episodes[path.read_text()], metadata=about)]
+        metadata = {"input": {"file": path.name, "start_ns": begins[path.name]}}
+        return [replace(episodes[path.read_text()], metadata=metadata)]
 
     monkeypatch.setattr(recordings, "read_mcap", read_mcap)
 
@@ -66,7 +66,7 @@ def test_a_softened_band_is_told_and_one_that_keeps_is_not(lab) -> None:
     lab.put("y.mcap", "b", MAY + 7 * DAY)
     same = lab.drift()
     assert same["verdict"] == [SAME] and same["next"] is None and same["order"] == BY_TIME
-    assert [one["file"] for one in same["recordings"]] == ["z.mcap", "y.mcap"]
+    assert [row["file"] for row in same["recordings"]] == ["z.mcap", "y.mcap"]
     young = same["recordings"][0]["values"]["youngs_modulus"]
     assert young["low"] < 2.2e5 < young["high"]
 
@@ -81,11 +81,11 @@ def test_a_softened_band_is_told_and_one_that_keeps_is_not(lab) -> None:
     change = content["changes"][0]
     assert (change["quantity"], change["later"]) == ("youngs_modulus", 2)
     assert change["ratio"] == pytest.approx(0.85, abs=0.03)
-    assert [one["new"] for one in content["recordings"]] == [False, False, True]
+    assert [row["new"] for row in content["recordings"]] == [False, False, True]
     assert content["next"].endswith("data/raw/mine/x.mcap --mass 0.023 --name mine_new")
 
     folder = lab.root / "reports/drift"
-    assert sorted(one.name for one in folder.iterdir()) == ["mine.json", "mine.png"]
+    assert sorted(file.name for file in folder.iterdir()) == ["mine.json", "mine.png"]
     assert json.loads((folder / "mine.json").read_text()) == json.loads(json.dumps(content))
     with Image.open(folder / "mine.png") as image:
         assert min(image.size) > 500
@@ -97,8 +97,8 @@ def test_a_softened_band_is_told_and_one_that_keeps_is_not(lab) -> None:
 def recorded(file: str, begin: int, end: int, deepest: float = 0.4) -> IdentifiedRecording:
     value = ValueOfRecording(value=1.0, low=0.9, high=1.1, deviation=0.06)
     values = dict.fromkeys(recordings.COMPARED, value)
-    about = {"key": file, "pulls": 1, "settled": True, "deepest": deepest, "values": values}
-    return IdentifiedRecording(file=file, begin=begin, end=end, **about)
+    fields = {"key": file, "pulls": 1, "settled": True, "deepest": deepest, "values": values}
+    return IdentifiedRecording(file=file, begin=begin, end=end, **fields)
 
 
 def test_stamps_order_recordings_unless_they_are_a_simulations() -> None:
@@ -120,7 +120,7 @@ def test_without_a_clock_names_decide(settings, tmp_path, monkeypatch) -> None:
     content = drift(settings, "mine", tmp_path)
     assert content["order"] == BY_NAME
     assert "in the order of their names" in shown(content)
-    assert [one["date"] for one in content["recordings"]] == [None, None]
+    assert [row["date"] for row in content["recordings"]] == [None, None]
 
 
 def test_what_had_not_settled_is_left_out(settings, tmp_path, monkeypatch, capsys) -> None:
@@ -159,12 +159,12 @@ def test_a_recording_that_stretched_it_further_is_a_change(settings, tmp_path, m
     assert line.startswith("c.mcap draws mine to 0.440 m, recordings before it to 0.402 m at most")
     assert content["stretched_further"] == [{"later": 2, "before_m": 0.402}]
     assert content["changes"] == []
-    assert [one["new"] for one in content["recordings"]] == [False, False, True, True]
+    assert [row["new"] for row in content["recordings"]] == [False, False, True, True]
     assert content["next"].split()[2:4] == [f"{tmp_path}/data/raw/mine/{x}.mcap" for x in "cd"]
     for before, silent in ((0.42, False), (0.438, True), (True, True)):
         sizes = settings.bands["mine"].model_dump() | {"preconditioned": before}
-        known = settings.changed(bands={"mine": sizes})
-        assert (drift(known, "mine", tmp_path)["verdict"] == [SAME]) == silent
+        params = settings.changed(bands={"mine": sizes})
+        assert (drift(params, "mine", tmp_path)["verdict"] == [SAME]) == silent
 
 
 def test_the_command_names_sizes_that_are_not_the_usual_ones() -> None:
@@ -179,7 +179,7 @@ def test_a_mistake_is_one_line(tmp_path, sling) -> None:
     def summary(band: str) -> str:
         done = sling("drift", "--band", band, folder=tmp_path)
         assert done.returncode == 1 and done.stdout == ""
-        (line,) = (one for one in done.stderr.splitlines() if not one.endswith(" ..."))
+        (line,) = (text for text in done.stderr.splitlines() if not text.endswith(" ..."))
         return line
 
     assert summary("none").startswith("error: band none: not in params.yaml")

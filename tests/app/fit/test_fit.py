@@ -47,13 +47,13 @@ def project(tmp_path, monkeypatch):
     monkeypatch.setattr("app.preflight.recordings.checked", lambda *given: [])
     requested, layout = [], Layout(tmp_path)
 
-    def dvc(root, arguments, **about):
+    def dvc(root, arguments, **callbacks):
         requested.append(arguments)
         band = arguments[1].partition("@")[2]
         layout.card(band).mkdir(parents=True, exist_ok=True)
         (layout.card(band) / "card.json").write_text(json.dumps(CARD | {"band": band}))
-        about["on_stage"](f"theta@{band}-least_squares")
-        about["on_line"](f"{band}: settled")
+        callbacks["on_stage"](f"theta@{band}-least_squares")
+        callbacks["on_line"](f"{band}: settled")
         return 0, []
 
     monkeypatch.setattr(child, "dvc", dvc)
@@ -73,8 +73,8 @@ def test_a_new_band_is_added_and_its_card_made(project) -> None:
     file = project.recording("My band 2.mcap", "a")
     card = project.run(file, mass=0.04, rest_length=0.5)
     assert card["band"] == "my_band_2" and card["card"].endswith("bands/my_band_2/README.md")
-    about = load().bands["my_band_2"]
-    assert (about.mass, about.rest_length, about.diameter) == (0.04, 0.5, 0.01)
+    band_params = load().bands["my_band_2"]
+    assert (band_params.mass, band_params.rest_length, band_params.diameter) == (0.04, 0.5, 0.01)
     assert project.requested == [("repro", "own_card@my_band_2")]
     again = project.run(file, mass=0.04, rest_length=0.5)
     assert again == card and load().run.own[-1] == "my_band_2"
@@ -224,7 +224,7 @@ def test_the_countdown_tells_each_stage_and_falls(capsys, monkeypatch) -> None:
     countdown.ends()
     lines = capsys.readouterr().err.splitlines()
     left = [line.rpartition("about ")[2].split()[0] for line in lines[: len(chain)]]
-    seconds = [60 * int(one.split(":")[0]) + int(one.split(":")[1]) for one in left]
+    seconds = [60 * int(text.split(":")[0]) + int(text.split(":")[1]) for text in left]
     assert lines[0].startswith(f"[1/{len(chain)}] episode; about")
     assert seconds == sorted(seconds, reverse=True) and seconds[0] == sum(worth.values())
     assert seconds[-1] == 2 * worth["card"]  # by then the machine's pace is known

@@ -32,8 +32,8 @@ def serving(
     root: Path, environment: Mapping[str, str] = os.environ
 ) -> Iterator[tuple[str, subprocess.Popen]]:
     """`sling ui` in a process, until SIGINT; what it says goes to root/said."""
-    with socket.create_server(("127.0.0.1", 0)) as one:
-        port = str(one.getsockname()[1])
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = str(listener.getsockname()[1])
     with (root / "said").open("w") as message:
         process = subprocess.Popen(
             [sys.executable, "-m", "app.cli", "ui", "--port", port],

@@ -38,8 +38,8 @@ def run(toy: Toy, name: str, lines: list[str] | None = None, **more) -> bool:
 
 def alive(text: str) -> list[str]:
     """Command lines of living processes that hold `text`."""
-    found = subprocess.run(["ps", "-eo", "stat,args"], capture_output=True, text=True).stdout
-    return [line for line in found.splitlines() if text in line and not line.startswith("Z")]
+    output = subprocess.run(["ps", "-eo", "stat,args"], capture_output=True, text=True).stdout
+    return [line for line in output.splitlines() if text in line and not line.startswith("Z")]
 
 
 def test_a_stage_runs_once_and_only_its_own_lines_are_heard(toy: Toy) -> None:
@@ -69,9 +69,9 @@ def test_a_full_disk_is_named_where_dvc_speaks_of_something_else(toy: Toy, monke
     assert with_disk(why, toy.folder) == why
 
 
-def failed(*own: str, why: str) -> list[str]:
+def failed(*lines: str, why: str) -> list[str]:
     """What DVC said of a stage that failed, around the stage's own lines."""
-    return ["Running stage 'x':", "> x.py", *own, f"ERROR: failed to reproduce 'x': {why}"]
+    return ["Running stage 'x':", "> x.py", *lines, f"ERROR: failed to reproduce 'x': {why}"]
 
 
 RUN = "failed to run: x.py, exited with"
@@ -96,8 +96,8 @@ def test_why_a_stage_failed_by_lines_of_dvc() -> None:
 
 def test_lines_come_as_they_are_printed_and_a_cancelled_stage_leaves_nothing(toy: Toy) -> None:
     cancelled, lines = Event(), []
-    with ThreadPoolExecutor(1) as one:
-        stage = one.submit(run, toy, "sleeper", lines, cancelled=cancelled.is_set)
+    with ThreadPoolExecutor(1) as pool:
+        stage = pool.submit(run, toy, "sleeper", lines, cancelled=cancelled.is_set)
         until(lambda: lines == ["sleeps"])
         assert alive("time.sleep(600)")
         cancelled.set()

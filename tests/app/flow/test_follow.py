@@ -116,23 +116,23 @@ def test_a_run_is_shown_once_with_its_times(shown: Shown, tmp_path: Path) -> Non
         run.line(REPORT, "error: it is")
         run.ended(REPORT, "fresh")
     shown.look(tmp_path)
-    found = shown.all(identity(run))
-    ((name, tags, state, begin, end, _),) = found["runs"]
+    rows = shown.all(identity(run))
+    ((name, tags, state, begin, end, _),) = rows["runs"]
     assert (name, tags, state) == ("b: m", '["b", "m"]', "Completed")
-    tasks = {one[0]: one[1:] for one in found["tasks"]}
-    assert {one: row[1] for one, row in tasks.items()} == {THETA: "Completed", REPORT: "Fresh"}
+    tasks = {row[0]: row[1:] for row in rows["tasks"]}
+    assert {task: row[1] for task, row in tasks.items()} == {THETA: "Completed", REPORT: "Fresh"}
     assert tasks[THETA][0] == '["b", "m"]' and (tasks[THETA][4], tasks[REPORT][4]) == (0, 1)
     assert begin <= tasks[THETA][2] <= tasks[THETA][3] <= tasks[REPORT][2] <= end
-    assert [one[:2] for one in found["lines"]] == [
+    assert [line[:2] for line in rows["lines"]] == [
         *((BAR.format(done, done), 20) for done in (1, 2, 4)),
         ("error: it is", 40),
     ]
-    bar, table = found["artifacts"]
+    bar, table = rows["artifacts"]
     assert bar[:2] == ("history-b-m", "progress") and float(bar[2]) == 100.0
     assert bar[3] == "██████████ · 4/4 rollouts · generation 4 · best 0.5"
     assert table == ("theta-b-m", "markdown", f'"| {THETA} |"', THETA)
     shown.look(tmp_path, looks=3)
-    assert shown.all(identity(run)) == found
+    assert shown.all(identity(run)) == rows
 
 
 def test_a_run_that_was_killed_crashed(shown: Shown, tmp_path: Path) -> None:
@@ -146,11 +146,11 @@ def test_a_run_that_was_killed_crashed(shown: Shown, tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes() + b'{"at": 1, "wh')  # it was writing when it was killed
     for _ in range(2):
         shown.look(tmp_path, looks=2)
-        found = shown.all(identity(run))
-        assert found["runs"][0][2] == "Crashed"
-        assert [one[2] for one in found["tasks"]] == ["Completed", "Crashed"]
-        assert len(found["states"]) == 2 and len(found["task states"]) == 4
-        assert found["artifacts"] == []  # a killed run's stages: who knows
+        rows = shown.all(identity(run))
+        assert rows["runs"][0][2] == "Crashed"
+        assert [row[2] for row in rows["tasks"]] == ["Completed", "Crashed"]
+        assert len(rows["states"]) == 2 and len(rows["task states"]) == 4
+        assert rows["artifacts"] == []  # a killed run's stages: who knows
 
 
 def test_a_run_is_followed_and_ends_as_if_it_were_read_at_once(shown: Shown, tmp_path) -> None:
@@ -170,19 +170,19 @@ def test_a_run_is_followed_and_ends_as_if_it_were_read_at_once(shown: Shown, tmp
         run.line(THETA, "said while nobody looks")
         run.ended(THETA, "ran")
         shown.look(tmp_path)
-        assert [one[0] for one in shown("artifacts", identity(run))] == ["history-b-m", "theta-b-m"]
+        assert [row[0] for row in shown("artifacts", identity(run))] == ["history-b-m", "theta-b-m"]
         run.begins(REPORT, (THETA,))
     shown.look(tmp_path)
-    found = shown.all(identity(run))
-    assert len(found["lines"]) == 3 and len(found["task states"]) == 4
-    assert found["runs"][0][2] == "Completed"
+    rows = shown.all(identity(run))
+    assert len(rows["lines"]) == 3 and len(rows["task states"]) == 4
+    assert rows["runs"][0][2] == "Completed"
     other = "f" * 32
     copied(tmp_path, tmp_path / "other")
     (path,) = (tmp_path / "other" / log.FOLDER).iterdir()
     path.write_text(path.read_text("utf-8").replace(identity(run), other), "utf-8")
     (tmp_path / "other" / "dvc.lock").write_text(LOCK)
     shown.look(tmp_path / "other")
-    assert shown.all(other) == found
+    assert shown.all(other) == rows
 
 
 def test_what_a_later_run_made_is_not_shown_as_an_earlier_ones(shown: Shown, tmp_path) -> None:

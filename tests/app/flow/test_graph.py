@@ -36,15 +36,15 @@ def toy(done: Toy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Toy:
 
 
 def test_stages_come_after_their_producers_the_longest_way_first(toy: Toy) -> None:
-    found = Graph(toy.folder).stages
-    assert list(found) == ORDER
-    assert found["top"] == Stage("top", "top", "", (), True, ("word", "work.py"), True)
-    assert found["side@left"] == Stage(
+    stages = Graph(toy.folder).stages
+    assert list(stages) == ORDER
+    assert stages["top"] == Stage("top", "top", "", (), True, ("word", "work.py"), True)
+    assert stages["side@left"] == Stage(
         "side@left", "side", "left", ("top",), False, ("work.py",), True
     )
-    assert found["bottom"].producers == ("side@left", "side@right")
-    assert [one.name for one in leading_to(found, "side@left")] == ["top", "side@left"]
-    assert len(leading_to(found, "bottom")) == 4
+    assert stages["bottom"].producers == ("side@left", "side@right")
+    assert [node.name for node in leading_to(stages, "side@left")] == ["top", "side@left"]
+    assert len(leading_to(stages, "bottom")) == 4
 
 
 def test_stale_is_what_dvc_would_run(toy: Toy) -> None:

@@ -97,13 +97,19 @@ def test_a_killed_stage_fails_with_one_line_and_leaves_nothing(toy: Toy) -> None
     ):
         (toy.folder / ".checkpoints/a").unlink(missing_ok=True)
         lines: list[str] = []
-        with ThreadPoolExecutor(1) as one:
-            stage = one.submit(run, lines)
+        with ThreadPoolExecutor(1) as pool:
+            stage = pool.submit(run, lines)
             assert wait(lambda: "step 3" in lines or stage.done(), READY)  # noqa: B023
-            python = [one for one in toy.run.named(victim) if one.name().startswith("python")]
-            found = [one for one in python if victim != "repro" or "guard" not in command_line(one)]
-            assert len(found) == 1, [command_line(one) for one in toy.run.alive()]
-            send(found[0])
+            python = [
+                process for process in toy.run.named(victim) if process.name().startswith("python")
+            ]
+            matches = [
+                process
+                for process in python
+                if victim != "repro" or "guard" not in command_line(process)
+            ]
+            assert len(matches) == 1, [command_line(process) for process in toy.run.alive()]
+            send(matches[0])
             with pytest.raises(StageFailed, match=f"^count@a: {reason}$"):
                 stage.result(20)
         assert not any("Traceback" in line for line in lines)

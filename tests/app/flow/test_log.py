@@ -21,7 +21,9 @@ def written(root: Path) -> list[dict]:
 
 
 def without_time(root: Path) -> list[dict]:
-    return [{name: one for name, one in event.items() if name != "at"} for event in written(root)]
+    return [
+        {name: value for name, value in event.items() if name != "at"} for event in written(root)
+    ]
 
 
 def test_a_run_in_lines(tmp_path: Path) -> None:
@@ -75,7 +77,7 @@ def test_a_run_without_stages_leaves_none_and_only_so_many_stay(tmp_path: Path) 
         (tmp_path / log.FOLDER / f"20200101T0000{number:02}Z-x.jsonl").touch()
     with log.RunLog(tmp_path, "sling flow", []) as run:
         run.begins("a")
-    left = sorted(one.name for one in (tmp_path / log.FOLDER).iterdir())
+    left = sorted(file.name for file in (tmp_path / log.FOLDER).iterdir())
     assert len(left) == log.KEPT and left[0] == "20200101T000004Z-x.jsonl"
 
 
@@ -121,10 +123,10 @@ def test_an_entry_of_dvc_lock_is_one_stages_own(tmp_path: Path) -> None:
     assert log.entry(tmp_path, "a@b-m") == ""
     path = tmp_path / "dvc.lock"
     path.write_text(LOCK)
-    one, other = log.entry(tmp_path, "a@b-m"), log.entry(tmp_path, "a@b-n")
-    assert one and other and one != other and log.entry(tmp_path, "a@b") == ""
+    first, other = log.entry(tmp_path, "a@b-m"), log.entry(tmp_path, "a@b-n")
+    assert first and other and first != other and log.entry(tmp_path, "a@b") == ""
     path.write_text(LOCK.replace("cmd: z", "cmd: new"))
-    assert log.entry(tmp_path, "a@b-m") == one and log.entry(tmp_path, "a@b-n") != other
+    assert log.entry(tmp_path, "a@b-m") == first and log.entry(tmp_path, "a@b-n") != other
 
 
 def test_names_and_tags_are_bands_and_methods() -> None:

@@ -45,7 +45,7 @@ def sling(toy: Toy, *arguments: str, **exported: str) -> subprocess.CompletedPro
 
 def last(toy: Toy) -> list[dict]:
     """The log of the last run."""
-    path = max((toy.folder / FOLDER).iterdir(), key=lambda one: one.stat().st_mtime_ns)
+    path = max((toy.folder / FOLDER).iterdir(), key=lambda file: file.stat().st_mtime_ns)
     return [json.loads(line) for line in path.read_text("utf-8").splitlines()]
 
 
@@ -114,7 +114,7 @@ def test_the_next_flow_goes_on_and_an_unchanged_output_ends_it(toy: Toy) -> None
     assert done.stdout.startswith("stages: 1 ran, 3 fresh after all, 0 failed, 0 not run (")
     assert toy.ran() == {"top"}
     assert toy.dvc("repro") == set()
-    states = {one.get("stage"): one["state"] for one in last(toy) if one["what"] == "ended"}
+    states = {event.get("stage"): event["state"] for event in last(toy) if event["what"] == "ended"}
     assert states == {
         "top": "ran", "side@left": "fresh", "side@right": "fresh", "bottom": "fresh", None: "ran",
     }  # fmt: skip
@@ -132,17 +132,20 @@ def test_the_ui_shows_runs_that_were_and_the_one_that_is(tmp_path: Path, history
         def shown() -> list[dict]:
             return ask(f"{url}/api", "/flow_runs/filter", {"sort": "START_TIME_ASC"})
 
-        until(lambda: [one["state_name"] for one in shown()] == ["Completed"], SECONDS)
+        until(lambda: [shown_run["state_name"] for shown_run in shown()] == ["Completed"], SECONDS)
         (toy.folder / "word").write_text("bad\n")
         done = sling(toy)
         assert f"seen at {url}" in done.stderr
-        until(lambda: [one["state_name"] for one in shown()] == ["Completed", "Failed"], SECONDS)
+        until(
+            lambda: [shown_run["state_name"] for shown_run in shown()] == ["Completed", "Failed"],
+            SECONDS,
+        )
         graph = ask(f"{url}/api", f"/flow_runs/{shown()[0]['id']}/graph-v2")
         nodes = {node["label"]: node for _, node in graph["nodes"]}
         assert [node["id"] for node in nodes["low"]["parents"]] == [nodes["top"]["id"]]
         message = ask(f"{url}/api", "/logs/filter", {})
         assert {"top works", "error: word: says bad; write something else"} <= {
-            one["message"] for one in message
+            record["message"] for record in message
         }
 
 

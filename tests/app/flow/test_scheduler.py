@@ -18,12 +18,15 @@ class Run(Scheduler):
 
     def begun(self) -> list[str]:
         """All that can begin now, as it begins."""
-        self.known = {**getattr(self, "known", {}), **{one.name: one for one in self.waiting}}
+        self.by_name = {
+            **getattr(self, "by_name", {}),
+            **{stage.name: stage for stage in self.waiting},
+        }
         return [stage.name for stage, _ in iter(self.next, None)]
 
     def ends(self, name: str, outcome: bool | UserError = True) -> list[str]:
         """What begins when that one has ended."""
-        self.done(self.known[name], outcome)
+        self.done(self.by_name[name], outcome)
         return self.begun()
 
 

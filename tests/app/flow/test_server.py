@@ -123,8 +123,8 @@ def test_a_server_that_a_full_disk_keeps_from_starting_is_said_so(tmp_path, monk
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     usage = shutil.disk_usage(tmp_path)
     for free, message in ((10_000, "No space left on device"), (10**8, "server.log says why")):
-        found = usage._replace(free=free)
-        monkeypatch.setattr(shutil, "disk_usage", lambda _, found=found: found)
+        disk = usage._replace(free=free)
+        monkeypatch.setattr(shutil, "disk_usage", lambda _, disk=disk: disk)
         with pytest.raises(UserError, match=message), server._server(tmp_path, 1):
             pass
 
@@ -132,7 +132,11 @@ def test_a_server_that_a_full_disk_keeps_from_starting_is_said_so(tmp_path, monk
 def listening(pid: int) -> set[tuple[str, int]]:
     family = [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]
     sockets = [connection for process in family for connection in process.net_connections("inet")]
-    return {(one.laddr.ip, one.laddr.port) for one in sockets if one.status == psutil.CONN_LISTEN}
+    return {
+        (connection.laddr.ip, connection.laddr.port)
+        for connection in sockets
+        if connection.status == psutil.CONN_LISTEN
+    }
 
 
 @pytest.mark.slow

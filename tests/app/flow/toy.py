@@ -72,6 +72,6 @@ class Toy(ProjectCopy):
     def ran(self) -> set[str]:
         """Outputs whose stages left a note since this was asked last."""
         notes = [*(self.folder / "notes").glob("*.json")]
-        for one in notes:
-            one.unlink()
-        return {one.stem for one in notes}
+        for path in notes:
+            path.unlink()
+        return {path.stem for path in notes}

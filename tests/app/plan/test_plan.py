@@ -61,8 +61,8 @@ def test_the_csv_is_the_trajectory_in_the_robots_base(plan, tmp_path) -> None:
     assert plan.trajectory.duration <= t[-1] < plan.trajectory.duration + 0.02
     to_base = np.array([[0.0, 1, 0, 0.7], [-1, 0, 0, 0.1], [0, 0, 1, 0.4], [0, 0, 0, 1]])
     back = np.linalg.inv(to_base)
-    for names, derivative, one in (("x y z", 0, 1.0), ("vx vy vz", 1, 0), ("ax ay az", 2, 0)):
-        given = np.column_stack([vectors(columns, names), np.full(len(t), one)]) @ back.T
+    for names, derivative, weight in (("x y z", 0, 1.0), ("vx vy vz", 1, 0), ("ax ay az", 2, 0)):
+        given = np.column_stack([vectors(columns, names), np.full(len(t), weight)]) @ back.T
         wanted = plan.trajectory.position(t, derivative)
         np.testing.assert_allclose(given[:, :3], wanted, atol=1e-7)
     hand = Rotation.from_quat(vectors(columns, "qx qy qz qw")).as_matrix()
@@ -88,7 +88,7 @@ def build(store, kind: str, content: object) -> object:
         else:
             (inner, what), _ = detail
             name = what if inner.name == "NAME" else ""
-            values[field] = [build(store, name, one) for one in content[field]]
+            values[field] = [build(store, name, element) for element in content[field]]
     assert set(values) == set(content)
     return store.types[kind](**values)
 
@@ -131,10 +131,10 @@ def test_the_gripper_opens_closes_and_opens(plan, tmp_path) -> None:
     for command in commands:
         message = build(store, kind, command["command"])
         assert store.deserialize_cdr(store.serialize_cdr(message, kind), kind) == message
-    positions = [one["command"]["position"] for one in commands]
+    positions = [row["command"]["position"] for row in commands]
     assert positions == [0.04, 0.0, 0.04]  # of each finger of a Franka's hand, which goes 0.04 m
-    assert {one["command"]["max_effort"] for one in commands} == {40.0}
-    stamps = [one["time_from_start"] for one in commands]
+    assert {row["command"]["max_effort"] for row in commands} == {40.0}
+    stamps = [row["time_from_start"] for row in commands]
     times = [stamp["sec"] + stamp["nanosec"] * 1e-9 for stamp in stamps]
     content = json.loads(plan.to_json(files))
     assert times == pytest.approx([0.0, content["grasp_s"], content["release_s"]])
@@ -153,8 +153,8 @@ def franka_moves_to(command: dict, width: float) -> float:
 
 def test_a_frankas_own_server_opens_closes_and_opens(params, tmp_path) -> None:
     plan, width, gaps = plan_recording(params, "band1", pulls=2), 0.02, []
-    for one in json.loads(plan.write(tmp_path, 10.0)[2].read_text()):
-        width = franka_moves_to(one["command"], width)
+    for row in json.loads(plan.write(tmp_path, 10.0)[2].read_text()):
+        width = franka_moves_to(row["command"], width)
         gaps.append(width)
     assert gaps == [0.08, 0.006, 0.08, 0.006, 0.08]
 
@@ -307,11 +307,11 @@ def test_a_designed_pull_says_what_it_is_worth(params, tmp_path, monkeypatch) ->
     text = plan.to_text(plan.write(tmp_path, 100.0))
     assert (tmp_path / "design.png").stat().st_size > 10_000
     pasted = "plan:\n" + text[text.index("  dips:") : text.index("\n\nwrote")]
-    (found,) = YAML(typ="safe").load(pasted)["plan"]["dips"]
-    again = plan_recording(with_(params, "plan", dips=(Dip(**found),)), "band1")
+    (dip_fields,) = YAML(typ="safe").load(pasted)["plan"]["dips"]
+    again = plan_recording(with_(params, "plan", dips=(Dip(**dip_fields),)), "band1")
     np.testing.assert_array_equal(again.trajectory.path.c, plan.trajectory.path.c)
 
-    other = {name: one for name, one in params.methods.items() if name != "least_squares"}
+    other = {name: method for name, method in params.methods.items() if name != "least_squares"}
     with pytest.raises(UserError, match="no method has search: least_squares and law: rubber"):
         plan_recording(params.model_copy(update={"methods": other}), "band1", pull="designed")
 
@@ -378,8 +378,8 @@ def test_a_band_that_the_arm_cannot_hold(params) -> None:
 
 
 def test_a_band_to_come_is_planned_by_its_sizes(params) -> None:
-    known, name = with_band(params, "band1")
-    assert (known, name) == (params, "band1")
+    unchanged, name = with_band(params, "band1")
+    assert (unchanged, name) == (params, "band1")
     longer, name = with_band(params, None, 0.04, 0.02, 0.6)
     assert name == "new" and longer.bands["new"].rest_length == 0.6 and "new" not in params.bands
     assert plan_recording(longer, name).stretch < plan_recording(params, "band1").stretch

@@ -112,8 +112,8 @@ def test_each_of_several_pulls_is_the_first_again_and_finds_the_band_calm(
     plan = PlanParams.model_validate(content)
     episode = PARAMS.episode.model_copy(update={"duration": duration, "tail": share * duration})
     rest = PARAMS.setup, episode, PARAMS.bands["band1"], AHEAD
-    one, way = (trajectory_of(plan, *rest, count, precondition) for count in (1, pulls))
-    np.testing.assert_array_equal(way.times[: len(one.times)], one.times)
+    single, way = (trajectory_of(plan, *rest, count, precondition) for count in (1, pulls))
+    np.testing.assert_array_equal(way.times[: len(single.times)], single.times)
     starts = dict.fromkeys(("lead-in", "grasp", "pause", "release"), ())
     for phase, start in zip(way.phases, way.times, strict=False):
         if phase.name in starts:
@@ -122,7 +122,7 @@ def test_each_of_several_pulls_is_the_first_again_and_finds_the_band_calm(
     lead, grasp, pause, release = map(np.array, starts.values())
     np.testing.assert_allclose(release - pause, release[0] - pause[0], atol=1e-6)
     held = (release - grasp)[1:]
-    stretched = one.until("release")
+    stretched = single.until("release")
     first = release[0] - grasp[0] - stretched["stretch"] - stretched["slacken"]
     np.testing.assert_allclose(held, first, atol=1e-6)
     calm = release[1:] + episode.tail - episode.duration - release[:-1]

@@ -76,8 +76,8 @@ def test_peaks_are_those_of_dense_samples_for_any_cubic_spline(points, gaps) -> 
     """A curved spline of scipy's, whose speed peaks inside the pieces."""
     times = np.cumsum(gaps[: len(points)])
     spline = CubicSpline(times - times[0], points)
-    one = Trajectory.through(points[0], 0.0, [Phase("all", points[-1], 1.0, 0.0)])
-    curved = replace(one, path=spline, times=np.array([0.0, spline.x[-1]]))
+    straight = Trajectory.through(points[0], 0.0, [Phase("all", points[-1], 1.0, 0.0)])
+    curved = replace(straight, path=spline, times=np.array([0.0, spline.x[-1]]))
     dense = np.linspace(0, spline.x[-1], 4001)
     for derivative in (1, 2):
         sampled = np.linalg.norm(spline(dense, derivative), axis=1).max()
@@ -87,9 +87,11 @@ def test_peaks_are_those_of_dense_samples_for_any_cubic_spline(points, gaps) -> 
 
 
 def test_before_and_after_the_hand_rests() -> None:
-    one = Trajectory.through(np.zeros(3), 0.08, [Phase("go", np.ones(3), 2.0, 0.0)])
-    np.testing.assert_allclose(one.position([-1.0, 3.0]), [np.zeros(3), np.ones(3)], atol=1e-14)
-    np.testing.assert_allclose(one.position([-1.0, 3.0], 1), 0, atol=1e-12)
+    trajectory = Trajectory.through(np.zeros(3), 0.08, [Phase("go", np.ones(3), 2.0, 0.0)])
+    np.testing.assert_allclose(
+        trajectory.position([-1.0, 3.0]), [np.zeros(3), np.ones(3)], atol=1e-14
+    )
+    np.testing.assert_allclose(trajectory.position([-1.0, 3.0], 1), 0, atol=1e-12)
 
 
 def test_fingers_and_names_by_time() -> None:

@@ -76,7 +76,7 @@ def test_masks_alone_are_copied_with_their_recording(by_folder, masked, mine) ->
     lost.write_bytes(retained)
     add(by_folder, mine)
     assert masks(by_folder / "data/raw/red/masked.masks") == masks(masked.with_suffix(".masks"))
-    assert sorted(one.name for one in (by_folder / "data/raw/red").iterdir()) == [
+    assert sorted(file.name for file in (by_folder / "data/raw/red").iterdir()) == [
         "masked.masks",
         "masked.mcap",
     ]
@@ -125,18 +125,18 @@ def test_pictures_are_those_to_mask_by_their_names(blind, seen, masked, params, 
     assert status == 0 and f"{tmp_path / 'to_mask'}: 54 pictures to mask" in text
     written = masks(tmp_path / "to_mask")
     assert written.keys() == masks(masked.with_suffix(".masks")).keys()
-    found = 0
+    count = 0
     reader = make_reader(seen[0].open("rb"), decoder_factories=[DecoderFactory()])
     for _, _, _, message in reader.iter_decoded_messages(topics=[COLOR]):
         stamp = message.header.stamp
         if packed := written.get(f"{stamp.sec * 10**9 + stamp.nanosec}.png"):
-            found += 1
+            count += 1
             theirs, ours = (
                 cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
                 for data in (message.data, packed)
             )
             np.testing.assert_array_equal(ours, theirs)
-    assert found == 54
+    assert count == 54
     cloud = params.cloud.model_copy(update={"mask": "folder"})
     text, status = check(
         blind[0], params.model_copy(update={"cloud": cloud}), pictures=tmp_path / "b"

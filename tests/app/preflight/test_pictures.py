@@ -84,10 +84,10 @@ def test_the_timeline_is_read_by_rerun(with_rerun, looked, params, tmp_path) -> 
     assert str(path) in write_timeline(looked, params, path)
     assert path.stat().st_size < 3 * looked.recording.path.stat().st_size
     rerun("verify", path)
-    found = set(entities(path))
+    paths = set(entities(path))
     pictures = {"/fork/color/picture", "/fork/color/mask", "/fork/depth/picture"}
     motion = {"/fork/cloud", "/fork/hand", "/fork/hand/force", "/force/y", "/position/z", "/speed"}
-    assert {*pictures, *motion, "/fork/tips", "/coverage", "/report", "/events"} <= found
+    assert {*pictures, *motion, "/fork/tips", "/coverage", "/report", "/events"} <= paths
 
     events = rerun("print", "-vvv", "--entity", "/events", path)
     times = dict(re.findall(r"PT([0-9.]+)S.*\[(grasp|release)\]", events))

@@ -47,7 +47,7 @@ def test_check_lists_the_pulls_and_looks_at_the_first_that_can_be_used(three, se
         assert f"{row['release_s']:.3f}" in text and row["verdict"].removesuffix(", but:") in text
     assert "empty mask" in content["pulls"][1]["verdict"]
     assert content["signals"]["release_s"] == content["pulls"][2]["release_s"]
-    rest = [one for one in content["cautions"] if one["about"] == "rest"]
+    rest = [caution for caution in content["cautions"] if caution["about"] == "rest"]
     assert "s after the pull before" in rest[0]["what"]  # its bag hardly waits
     text, status = check(path, params, pull=2)
     assert status == 1 and "pull 2 of 3: cannot be used: empty mask" in text
@@ -56,8 +56,8 @@ def test_check_lists_the_pulls_and_looks_at_the_first_that_can_be_used(three, se
 
 
 def test_a_pull_alone_has_nothing_to_rest_from(looked, params) -> None:
-    found = {caution.about for caution in looked.report.cautions}
-    assert "rest" not in found and looked.report.pulls == [looked.report.row]
+    names = {caution.about for caution in looked.report.cautions}
+    assert "rest" not in names and looked.report.pulls == [looked.report.row]
 
 
 def test_recordings_are_added_to_a_band(project, seen, three) -> None:
@@ -95,24 +95,24 @@ def test_a_split_bag_is_checked_and_kept_as_its_folder(project, seen, params, tm
     parts = split(seen[0], tmp_path / "given" / "july.1", (1.0, 2.0), "july")
     metadata(parts[0].parent, *(part.name for part in parts))
     whole = json.loads(check(seen[0], params, as_json=True)[0])
-    found = json.loads(check(parts[0].parent, params, as_json=True)[0])
-    assert (found["usable"], found["losses"]) == (True, []) and found["signals"] == whole["signals"]
-    assert found["cloud"] == whole["cloud"]
+    report = json.loads(check(parts[0].parent, params, as_json=True)[0])
+    assert (report["usable"], report["losses"]) == (True, [])
+    assert report["signals"] == whole["signals"] and report["cloud"] == whole["cloud"]
 
     (parts[0].parent.parent / "july.1.masks").mkdir()
     (parts[0].parent.parent / "july.1.masks" / "17.png").write_bytes(b"mask")
     add(project, parts[0].parent)
     retained = project / "data/raw/red/july_1"
     assert Layout(project).recordings("red") == [retained]
-    assert {one.name for one in retained.iterdir()} == {*(p.name for p in parts), "metadata.yaml"}
+    assert {file.name for file in retained.iterdir()} == {*(p.name for p in parts), "metadata.yaml"}
     assert (retained.with_name("july_1.masks") / "17.png").read_bytes() == b"mask"
     for again in (retained, parts[1]):
         with pytest.raises(UserError, match="is there already, as .*july_1"):
             more(project, again)
-    one = tmp_path / "one"
-    one.mkdir()
-    shutil.copy(seen[0], one / "one_0.mcap")
-    more(project, one)
+    folder = tmp_path / "one"
+    folder.mkdir()
+    shutil.copy(seen[0], folder / "one_0.mcap")
+    more(project, folder)
     assert [file.name for file in Layout(project).recordings("red")] == ["july_1", "one.mcap"]
 
 

@@ -57,7 +57,7 @@ def test_what_is_lost_is_said_once(checked) -> None:
     note = "no checksums in the file: damage to its messages would not be noticed"
     odd = with_recording(checked, notes=[note], losses=["a chunk is damaged", "another is"])
     message = list(container.findings(odd))
-    assert [one.about for one in message] == ["checksums", "losses"]
+    assert [finding.about for finding in message] == ["checksums", "losses"]
     assert message[1].what == "2 things were lost or mended, first of all: a chunk is damaged"
 
 
@@ -92,8 +92,8 @@ def test_times_of_receipt_tell_of_another_clock(checked) -> None:
     for role, cases in (("pose", poses), ("color", seen)):
         for offset, message in cases.items():
             stream = replace(getattr(recording, role), delay=recording.wrench.delay - offset)
-            found = times.findings(with_recording(checked, **{role: stream}))
-            words = [one.what for one in found if one.about == "clock"]
+            findings = times.findings(with_recording(checked, **{role: stream}))
+            words = [finding.what for finding in findings if finding.about == "clock"]
             assert len(words) == message and all(f"{offset:+.3f} s" in what for what in words)
 
 
@@ -102,8 +102,8 @@ def test_pictures_without_a_band_are_said(checked) -> None:
     none = [np.zeros((0, 3), np.float32)] * 20
     points = [*checked.clouds.points[:-20], *none]
     clouds = replace(checked.clouds, points=points, damaged=20, unpaired=20)
-    found = abouts(pictures.findings(with_results(checked, clouds=clouds)))
-    assert found == {"empty", "damaged", "unpaired"}
+    names = abouts(pictures.findings(with_results(checked, clouds=clouds)))
+    assert names == {"empty", "damaged", "unpaired"}
     low = [replace(row, coverage=0.5) for row in checked.coverage if row.phase == "drawn"]
     assert abouts(pictures.of_coverage(low)) == {"coverage", "unseen"}
 
@@ -111,7 +111,7 @@ def test_pictures_without_a_band_are_said(checked) -> None:
 @pytest.mark.fires("unseen")
 def test_a_camera_that_stops_before_the_release_is_said(checked) -> None:
     rows = [row for row in checked.coverage if row.phase in ("hanging", "held", "drawn")]
-    message = [one.what for one in pictures.of_coverage(rows) if one.about == "unseen"]
+    message = [finding.what for finding in pictures.of_coverage(rows) if finding.about == "unseen"]
     assert message == [f"no picture shows how the band {how}" for how in ("recoils", "swings")]
 
 
@@ -171,8 +171,8 @@ def test_the_pause_before_the_release(checked, seen) -> None:
 @pytest.mark.fires("pull")
 def test_a_step_that_fails_refuses_and_is_the_last_finding(checked) -> None:
     short = checked.pull.recording.wrench.between(0, checked.pull.recording.origin + 10**9)
-    found = findings_of(with_recording(checked, wrench=short))
-    assert found[-1].about == "pull" and found[-1].refused and not found[-1].cure
+    findings = findings_of(with_recording(checked, wrench=short))
+    assert findings[-1].about == "pull" and findings[-1].refused and not findings[-1].cure
 
 
 @pytest.mark.fires("gap", "missing", "force_rate", "picture_rate")

@@ -25,7 +25,7 @@ def with_force(done, change):
     return type(done).of(odd.pull, done.band, done.params)
 
 
-def found(done: Processed) -> list[Finding]:
+def findings_of(done: Processed) -> list[Finding]:
     return [*force.findings(done), *hold.findings(done)]
 
 
@@ -36,14 +36,18 @@ def turned(done, axis: str, degrees: float):
 
 
 def test_a_sound_force_is_left(checked) -> None:
-    assert not found(checked)
+    assert not findings_of(checked)
 
 
 @pytest.mark.fires("direction")
 @pytest.mark.parametrize("axis", ["x", "z"])
 @pytest.mark.parametrize("degrees", [-28, -15, -6, 6, 15, 28])
 def test_a_turned_sensor(checked, axis, degrees) -> None:
-    message = [one for one in found(turned(checked, axis, degrees)) if one.about == "direction"]
+    message = [
+        finding
+        for finding in findings_of(turned(checked, axis, degrees))
+        if finding.about == "direction"
+    ]
     assert len(message) == 1 and message[0].refused == (abs(degrees) > 12)
     way = {"x": ("presses down", "lifts"), "z": ("to the right", "to the left")}[axis]
     assert way[degrees > 0] in message[0].what
@@ -62,8 +66,8 @@ def test_a_range_that_ends(checked, share) -> None:
         values[:, k] = np.clip(values[:, k], rest[k] - most, rest[k] + most)
         return values
 
-    message = found(with_force(checked, clipped))
-    assert [one.about for one in message if one.refused][0] == "range"
+    message = findings_of(with_force(checked, clipped))
+    assert [finding.about for finding in message if finding.refused][0] == "range"
     assert "its range ends" in message[0].what
 
 
@@ -84,8 +88,8 @@ def test_units(checked) -> None:
         (1e-3, "millinewtons", True),
         (9.81, "kilograms-force", False),
     ):
-        message = found(with_force(checked, lambda _, values, by=newtons: values / by))
-        units = [one for one in message if one.about == "units"]
+        message = findings_of(with_force(checked, lambda _, values, by=newtons: values / by))
+        units = [finding for finding in message if finding.about == "units"]
         assert units and units[0].refused == refused and name in units[0].what
     with pytest.raises(UserError, match="is it in kilonewtons"):
         _ = with_force(checked, lambda _, values: values / 1e3).pull.release
@@ -109,12 +113,12 @@ def test_a_filtered_force(checked, count) -> None:
 def test_zeros_are_named(checked) -> None:
     release = checked.pull.release.time
     zero = with_force(checked, lambda t, values: values - 3.0 * (t > 0.4)[:, None])
-    assert abouts(found(zero)) == {"zeroed"} and not zero.signals.facts.slips
+    assert abouts(findings_of(zero)) == {"zeroed"} and not zero.signals.facts.slips
     hold_force = np.linalg.norm(checked.signals.facts.hold_force)
     for share, refused in ((0.05, False), (0.2, True)):
         off = share * hold_force / np.sqrt(3)
         odd = with_force(checked, lambda t, x, by=off: x + by * (t > release + 0.01)[:, None])
-        (message,) = (one for one in found(odd) if one.about == "zero")
+        (message,) = (finding for finding in findings_of(odd) if finding.about == "zero")
         assert message.refused == refused and "after the release" in message.what
     assert "jump" in abouts(force.findings(with_facts(checked, jumps=[0.1])))
 

@@ -97,14 +97,14 @@ def chosen(params, *channels: Channel, camera=CAMERA, topics=(), **setup: object
 
 def played(choice) -> tuple[str, np.ndarray]:
     """Frame, and what the reader makes of a topic."""
-    found = [choice.read(payload) for payload in choice.channel.payloads]
-    stamps = np.array([one.stamp for one in found])
+    samples = [choice.read(payload) for payload in choice.channel.payloads]
+    stamps = np.array([sample.stamp for sample in samples])
     np.testing.assert_array_equal(stamps, 5_000_000_000 + np.round(1e9 * TIMES))
-    values = np.array([one.value for one in found])
-    return found[0].frame, choice.convert(stamps, values) if choice.convert else values
+    values = np.array([sample.value for sample in samples])
+    return samples[0].frame, choice.convert(stamps, values) if choice.convert else values
 
 
-def assert_poses(found: np.ndarray, atol: float = 1e-9) -> None:
-    np.testing.assert_allclose(found[:, :3], POSES[:, :3], atol=atol)
-    off = (Rotation.from_quat(found[:, 3:]).inv() * TURNS).magnitude()
+def assert_poses(poses: np.ndarray, atol: float = 1e-9) -> None:
+    np.testing.assert_allclose(poses[:, :3], POSES[:, :3], atol=atol)
+    off = (Rotation.from_quat(poses[:, 3:]).inv() * TURNS).magnitude()
     assert off.max() < max(atol, 1e-7)

@@ -29,14 +29,14 @@ def parts(whole, tmp_path) -> list[Path]:
     return split(whole, tmp_path / "my", (1.0, 2.5))
 
 
-def same(one, other) -> None:
+def same(first, other) -> None:
     """Two recordings hold the same signals."""
-    assert one.streams.keys() == other.streams.keys()
-    for role, stream in one.streams.items():
+    assert first.streams.keys() == other.streams.keys()
+    for role, stream in first.streams.items():
         np.testing.assert_array_equal(stream.stamp, other.streams[role].stamp)
         if role not in ("color", "depth"):
             np.testing.assert_array_equal(stream.values, other.streams[role].values)
-    assert one.transforms.frames == other.transforms.frames
+    assert first.transforms.frames == other.transforms.frames
 
 
 def test_a_split_bag_is_one_recording(whole, parts, params) -> None:
@@ -48,10 +48,10 @@ def test_a_split_bag_is_one_recording(whole, parts, params) -> None:
         same(read_recording(given, params.setup), wanted)
         assert (parts_of(given), name_of(given)) == (parts, "my")
     metadata(folder, *(part.name for part in parts[::-1]))
-    found = read_recording(folder, params.setup)
-    same(found, wanted)
-    assert found.losses == wanted.losses == [] and found.path == folder
-    assert len({sha256(one) for one in (folder, *parts)}) == 1
+    recording = read_recording(folder, params.setup)
+    same(recording, wanted)
+    assert recording.losses == wanted.losses == [] and recording.path == folder
+    assert len({sha256(path) for path in (folder, *parts)}) == 1
     assert once([*parts, whole]) == [parts[0], whole]
     assert once([parts[2], folder, whole, whole]) == [parts[2], whole, whole]
 
@@ -60,19 +60,19 @@ def test_the_bag_that_a_library_of_others_writes(whole, tmp_path, params) -> Non
     """rosbags names its file and writes the metadata; its one part is the recording."""
     with whole.open("rb") as stream:
         messages = list(make_reader(stream).iter_messages())
-    folder, known = tmp_path / "other", {}
+    folder, connections = tmp_path / "other", {}
     plugin = StoragePlugin.MCAP
     with BagWriter(folder, version=9, storage_plugin=plugin) as bag:
         for schema, channel, message in messages:
             assert schema
-            if channel.topic not in known:
-                known[channel.topic] = bag.add_connection(
+            if channel.topic not in connections:
+                connections[channel.topic] = bag.add_connection(
                     channel.topic,
                     schema.name,
                     msgdef=schema.data.decode(),
                     rihs01="RIHS01_" + 64 * "0",
                 )
-            bag.write(known[channel.topic], message.log_time, message.data)
+            bag.write(connections[channel.topic], message.log_time, message.data)
     assert [part.name for part in parts_of(folder)] == ["other.mcap"]
     same(read_recording(folder, params.setup), read_recording(whole, params.setup))
     assert sha256(folder) == sha256(folder / "other.mcap") and name_of(folder) == "other"

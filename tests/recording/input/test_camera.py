@@ -62,30 +62,30 @@ def distorted(points: np.ndarray, d: list[float]) -> np.ndarray:
     ],
 )
 def test_pinholes(model, distortion) -> None:
-    found = camera(info(distortion=distortion, model=model))
+    result = camera(info(distortion=distortion, model=model))
     expected = distorted(POINTS, distortion[:12])
-    np.testing.assert_allclose(found.project(POINTS), expected, atol=1e-9)
-    assert_rays_lead_back(found)
+    np.testing.assert_allclose(result.project(POINTS), expected, atol=1e-9)
+    assert_rays_lead_back(result)
 
 
 @pytest.mark.parametrize("model", ["equidistant", "fisheye", "kannala_brandt"])
 def test_fisheyes(model) -> None:
     k = [0.02, -0.01, 0.003, -0.001]
-    found = camera(info(distortion=k, model=model))
+    result = camera(info(distortion=k, model=model))
     away = np.hypot(POINTS[:, 0], POINTS[:, 1])
     angle = np.arctan2(away, POINTS[:, 2])
     radius = angle * (1 + sum(c * angle ** (2 * i) for i, c in enumerate(k, 1)))
     x, y = (POINTS[:, :2] * (radius / away)[:, None]).T
     expected = np.stack([60 * x + 31.5, 62 * y + 23.5], axis=1)
-    np.testing.assert_allclose(found.project(POINTS), expected, atol=1e-9)
-    assert_rays_lead_back(found)
+    np.testing.assert_allclose(result.project(POINTS), expected, atol=1e-9)
+    assert_rays_lead_back(result)
 
 
-def assert_rays_lead_back(found: Camera) -> None:
-    points = found.rays().reshape(-1, 3) * np.linspace(0.5, 2, 64 * 48)[:, None]
+def assert_rays_lead_back(model: Camera) -> None:
+    points = model.rays().reshape(-1, 3) * np.linspace(0.5, 2, 64 * 48)[:, None]
     u, v = np.meshgrid(np.arange(64), np.arange(48))
     expected = np.stack([u, v], -1).reshape(-1, 2)
-    np.testing.assert_allclose(found.project(points), expected, atol=1e-4)
+    np.testing.assert_allclose(model.project(points), expected, atol=1e-4)
 
 
 def test_foxglove_and_ros_1_have_capitals() -> None:
@@ -109,9 +109,9 @@ def test_foxglove_and_ros_1_have_capitals() -> None:
 def test_rectified_images_have_the_camera_p() -> None:
     p = [50.0, 0, 30, 0, 0, 50, 20, 0, 0, 0, 1, 0]
     message = info(distortion=PLUMB_BOB, p=p)
-    found = camera(message, image="/camera/image_rect_color/compressed")
-    np.testing.assert_array_equal(found.matrix, [[50, 0, 30], [0, 50, 20], [0, 0, 1]])
-    assert not len(found.distortion)
+    result = camera(message, image="/camera/image_rect_color/compressed")
+    np.testing.assert_array_equal(result.matrix, [[50, 0, 30], [0, 50, 20], [0, 0, 1]])
+    assert not len(result.distortion)
     assert camera(message, image="/camera/rectified").matrix[0, 0] == 50
     for image in ("/camera/image_raw", "/direct/correct_image"):
         assert camera(message, image=image).matrix[0, 0] == 60

@@ -109,9 +109,9 @@ def test_two_steps() -> None:
     stamp = true.copy()
     stamp[400:] += 900 * MS
     stamp[800:] -= 300 * MS
-    found = clocks.steps(stamp, log)
-    assert [step.index for step in found] == [400, 800]
-    assert np.abs(clocks.without(stamp, found) - true).max() < 1 * MS
+    steps = clocks.steps(stamp, log)
+    assert [step.index for step in steps] == [400, 800]
+    assert np.abs(clocks.without(stamp, steps) - true).max() < 1 * MS
 
 
 def test_chunks_in_another_order_or_in_none_are_no_set_clock() -> None:
@@ -119,8 +119,8 @@ def test_chunks_in_another_order_or_in_none_are_no_set_clock() -> None:
     chunks = np.r_[0:1000, 3000:4000, 2000:3000, 1000:2000, 4000:6000]
     for order in (chunks, np.random.default_rng(1).permutation(6000)):
         assert clocks.rewinds(stamp[order], log[order]) == []
-        found = order[clocks.arrival(stamp[order], log[order])]
-        assert np.abs(found - np.arange(6000)).max() < 5  # as their delays have it
+        result = order[clocks.arrival(stamp[order], log[order])]
+        assert np.abs(result - np.arange(6000)).max() < 5  # as their delays have it
 
 
 def test_stamps_far_from_all_others() -> None:
@@ -155,11 +155,13 @@ def test_nothing_is_said_of_a_good_file(good) -> None:
 
 @pytest.mark.parametrize("kind", ["pose", "gripper"])
 def test_another_clock_of_pose_or_gripper_is_put_right(tmp_path, params, good, kind) -> None:
-    found = read(tmp_path, params, change=shift(kind, by=-3600.0))
-    mended, true = getattr(found, kind), getattr(good, kind)
+    recording = read(tmp_path, params, change=shift(kind, by=-3600.0))
+    mended, true = getattr(recording, kind), getattr(good, kind)
     assert np.abs(mended.stamp - true.stamp).max() < 1 * MS
     np.testing.assert_array_equal(mended.values, true.values)
-    assert len(found.losses) == 1 and "on another clock: +3600.000 s added" in found.losses[0]
+    assert (
+        len(recording.losses) == 1 and "on another clock: +3600.000 s added" in recording.losses[0]
+    )
 
 
 @pytest.mark.parametrize(
@@ -182,49 +184,49 @@ def test_log_time_on_a_clock_of_its_own_or_with_a_step_does_no_harm(tmp_path, pa
         def receive(kind, t, delay, by=by, since=since):
             return t + delay + by * (t > since)
 
-        found = read(tmp_path, params, receive=receive)
-        for role, stream in found.streams.items():
+        recording = read(tmp_path, params, receive=receive)
+        for role, stream in recording.streams.items():
             np.testing.assert_array_equal(stream.stamp, good.streams[role].stamp)
-        assert found.losses == []
+        assert recording.losses == []
 
 
 def test_messages_out_of_order_are_sorted_and_said(tmp_path, params, good) -> None:
-    found = read(tmp_path, params, change=shift("pose", by=-0.012, since=2, until=2.005))
-    assert found.losses == ["/arm/current_pose: 1 message out of order, sorted by stamp"]
-    assert np.all(np.diff(found.pose.stamp) > 0)
-    assert len(found.pose.stamp) == len(good.pose.stamp)
+    recording = read(tmp_path, params, change=shift("pose", by=-0.012, since=2, until=2.005))
+    assert recording.losses == ["/arm/current_pose: 1 message out of order, sorted by stamp"]
+    assert np.all(np.diff(recording.pose.stamp) > 0)
+    assert len(recording.pose.stamp) == len(good.pose.stamp)
 
 
 @pytest.mark.parametrize("kind", ["wrench", "pose", "gripper", "depth"])
 def test_a_step_in_one_topic(tmp_path, params, good, kind) -> None:
     # Whatever part is longer, the part on the others' clock is right.
     for at, part in (("+1.2000 s at 2.0", {"since": 2.0}), ("-1.2000 s at", {"until": 3.0})):
-        found = read(tmp_path, params, change=shift(kind, by=1.2, **part))
-        assert np.abs(getattr(found, kind).stamp - getattr(good, kind).stamp).max() < 0.1 * MS
-        (loss,) = found.losses
+        recording = read(tmp_path, params, change=shift(kind, by=1.2, **part))
+        assert np.abs(getattr(recording, kind).stamp - getattr(good, kind).stamp).max() < 0.1 * MS
+        (loss,) = recording.losses
         assert f"clock step of {at}" in loss
 
 
 def test_a_step_in_all_topics_keeps_them_together(tmp_path, params, good) -> None:
     kinds = ("wrench", "pose", "gripper", "color", "depth", "info")
-    found = read(tmp_path, params, change=shift(*kinds, by=0.8, since=2.0))
-    for role, stream in found.streams.items():
+    recording = read(tmp_path, params, change=shift(*kinds, by=0.8, since=2.0))
+    for role, stream in recording.streams.items():
         off = stream.stamp - good.streams[role].stamp
         assert np.ptp(off) < 0.1 * MS and abs(np.median(off) - 800 * MS) < 0.1 * MS, role
-    assert sum("clock step" in loss for loss in found.losses) == 5
+    assert sum("clock step" in loss for loss in recording.losses) == 5
 
 
 def test_the_machine_clock_steps_back_in_all_topics(tmp_path, params, good) -> None:
     kinds = ("wrench", "pose", "gripper", "color", "depth", "info")
-    found = read(
+    recording = read(
         tmp_path,
         params,
         change=shift(*kinds, by=-0.80037, since=2.0),
         receive=lambda kind, t, delay: t + delay - 0.80037 * (t >= 2.0),
     )
-    for role, stream in found.streams.items():
+    for role, stream in recording.streams.items():
         assert np.abs(stream.stamp - good.streams[role].stamp).max() < 0.1 * MS, role
-    assert any("step of its machine's clock of -0.8004 s" in loss for loss in found.losses)
+    assert any("step of its machine's clock of -0.8004 s" in loss for loss in recording.losses)
 
 
 def test_an_uneven_topic_with_a_step_is_refused(tmp_path, params) -> None:
@@ -245,11 +247,11 @@ def test_an_uneven_gripper_with_a_step_is_put_right(tmp_path, params, good) -> N
         message.header.stamp.sec += 7 * (stamp > START + 2 * 10**9)
         return stamp // (20 * MS) % 3 != 0  # every third one is missing
 
-    found = read(tmp_path, params, change=edit(gripper=uneven))
-    (loss,) = found.losses
+    recording = read(tmp_path, params, change=edit(gripper=uneven))
+    (loss,) = recording.losses
     assert "/gripper/joint_states: clock step of +6.99" in loss
-    near = np.searchsorted(good.gripper.stamp, found.gripper.stamp - 5 * MS)
-    off = found.gripper.stamp - good.gripper.stamp[near]
+    near = np.searchsorted(good.gripper.stamp, recording.gripper.stamp - 5 * MS)
+    off = recording.gripper.stamp - good.gripper.stamp[near]
     assert np.abs(off).max() < 3 * MS
 
 
@@ -262,14 +264,14 @@ def test_gaps_and_ends_are_said(tmp_path, params) -> None:
         return lambda stamp, message: not low < (stamp - START) * 1e-9 < high
 
     gone = {"pose": outside(3.5, 9.0), "color": outside(1.0, 1.6), "gripper": outside(-1.0, 0.6)}
-    found = read(tmp_path, params, change=edit(wrench=lose, **gone))
-    words = "\n".join(found.losses)
+    recording = read(tmp_path, params, change=edit(wrench=lose, **gone))
+    words = "\n".join(recording.losses)
     assert "/ft/wrench: lost 50 not finite" in words
     assert "/ft/wrench: gap of 0.102 s at 0.80 s" in words
     assert "/arm/current_pose: stops 0.70 s before the others" in words
     assert "/gripper/joint_states: starts 0.60 s after the others" in words
     assert "/camera/color/compressed: gap of 0.667 s at 0.94 s" in words
-    assert found.wrench.lost == 50 and np.isfinite(found.wrench.values).all()
+    assert recording.wrench.lost == 50 and np.isfinite(recording.wrench.values).all()
 
 
 def test_stamps_that_are_missing(tmp_path, params, good) -> None:
@@ -294,14 +296,16 @@ def test_a_frozen_sensor_is_remarked_on(tmp_path, params) -> None:
         if 2 * 10**9 <= stamp - START < 2.5e9:
             message.wrench = held.setdefault("wrench", message.wrench)
 
-    found = read(tmp_path, params, change=edit(wrench=freeze))
-    assert any("/ft/wrench: the same value 250 times from 2.00 s" in note for note in found.notes)
+    recording = read(tmp_path, params, change=edit(wrench=freeze))
+    assert any(
+        "/ft/wrench: the same value 250 times from 2.00 s" in note for note in recording.notes
+    )
 
 
 def test_shifted_puts_late_stamps_right(good) -> None:
-    found = good.shifted(pose=0.004, camera=-0.010)
+    shifted = good.shifted(pose=0.004, camera=-0.010)
     for role, by in (("pose", 4), ("color", -10), ("depth", -10), ("wrench", 0), ("gripper", 0)):
-        off = good.streams[role].stamp - found.streams[role].stamp
+        off = good.streams[role].stamp - shifted.streams[role].stamp
         np.testing.assert_array_equal(off, by * MS)
 
 
@@ -315,16 +319,18 @@ def test_a_given_delay_is_taken_off_first(tmp_path, params, good, late) -> None:
     assert summary == pytest.approx(late, abs=0.05)
     for camera in (late, summary):
         delays = params.episode.delays.model_copy(update={"camera": camera})
-        found = read_recording(path, params.setup, delays)
-        assert found.late == {"color": camera, "depth": camera}
-        off = found.depth.stamp - good.depth.stamp
+        recording = read_recording(path, params.setup, delays)
+        assert recording.late == {"color": camera, "depth": camera}
+        off = recording.depth.stamp - good.depth.stamp
         np.testing.assert_allclose(off * 1e-9, late - camera, atol=1e-9)
         given = params.model_copy(
             update={"episode": params.episode.model_copy(update={"delays": delays})}
         )
-        right, output = correct_delays(Pull.of(found, params.setup), given)
+        right, output = correct_delays(Pull.of(recording, params.setup), given)
         assert output.camera.applied and output.camera.value == camera
-        np.testing.assert_array_equal(right.recording.depth.stamp, found.depth.stamp)  # not twice
+        np.testing.assert_array_equal(
+            right.recording.depth.stamp, recording.depth.stamp
+        )  # not twice
 
 
 @pytest.mark.parametrize("rate", [-3e-3, 0.0, 5e-4])
@@ -332,8 +338,8 @@ def test_a_drift_is_told_by_the_least_delays(rate) -> None:
     for seed in range(5):
         stamp = np.arange(0, 9 * 10**9, 10**6)
         waits = np.random.default_rng(seed).exponential(2e5, len(stamp)).astype(np.int64)
-        found, error = clocks.drift((stamp * (1 + rate)).astype(np.int64), stamp + 10**6 + waits)
-        assert abs(found + rate) < 5 * error and error < 1e-5
+        drift, error = clocks.drift((stamp * (1 + rate)).astype(np.int64), stamp + 10**6 + waits)
+        assert abs(drift + rate) < 5 * error and error < 1e-5
     assert clocks.drift(stamp[:1000], stamp[:1000])[1] == np.inf
 
 

@@ -79,14 +79,14 @@ def read(folder: Path, *records, end=END, magic: bytes = MAGIC):
 
 
 def times(container, topic: str = "/x") -> list[int]:
-    found = [one for one in container.channels if one.topic == topic]
-    return [(t - START) // 10**9 for one in found for t in one.log_times]
+    matches = [channel_i for channel_i in container.channels if channel_i.topic == topic]
+    return [(t - START) // 10**9 for channel_i in matches for t in channel_i.log_times]
 
 
 def test_a_plain_file(tmp_path) -> None:
-    found = read(tmp_path, chunk([SCHEMA, channel(), message(0), message(1)]))
-    assert times(found) == [0, 1] and (found.losses, found.notes) == ([], [])
-    assert found.channels[0].payloads == [b"12345678"] * 2
+    file = read(tmp_path, chunk([SCHEMA, channel(), message(0), message(1)]))
+    assert times(file) == [0, 1] and (file.losses, file.notes) == ([], [])
+    assert file.channels[0].payloads == [b"12345678"] * 2
 
 
 def test_damaged_chunks_are_dropped_with_their_time(tmp_path) -> None:
@@ -102,33 +102,33 @@ def test_damaged_chunks_are_dropped_with_their_time(tmp_path) -> None:
         kinds.Chunk("lz4", b"no frame", START + 3 * 10**9, START + 4 * 10**9, 1, 100),
     ):
         bad.message_start_time, bad.message_end_time = START + 3 * 10**9, START + 4 * 10**9
-        found = read(tmp_path, first, bad, chunk([message(5)]))
-        assert times(found)[0] == 0 and times(found)[-1] == 5
-        assert found.losses == ["1 damaged chunk dropped: 3.00 to 4.00 s"]
+        file = read(tmp_path, first, bad, chunk([message(5)]))
+        assert times(file)[0] == 0 and times(file)[-1] == 5
+        assert file.losses == ["1 damaged chunk dropped: 3.00 to 4.00 s"]
 
 
 def test_a_wrong_length_costs_what_is_near_it(tmp_path) -> None:
     whole = [chunk([SCHEMA, channel(), message(0)]), *(chunk([message(k)]) for k in (1, 2, 3))]
-    parts = [bytearray(packed([one])) for one in whole]
+    parts = [bytearray(packed([record])) for record in whole]
     for value in (0, 5, 10**6, 2**64 - 1):
         parts[1][1:9] = struct.pack("<Q", value)
-        found = read(tmp_path, *map(bytes, parts))
-        assert times(found) == [0, 2, 3]
-        assert "unreadable bytes" in found.losses[0]
+        file = read(tmp_path, *map(bytes, parts))
+        assert times(file) == [0, 2, 3]
+        assert "unreadable bytes" in file.losses[0]
     bare = [SCHEMA, channel(), *map(message, range(6))]
-    parts = [bytearray(packed([one])) for one in bare]
+    parts = [bytearray(packed([record])) for record in bare]
     parts[4][1:9] = struct.pack("<Q", 2**40)
-    found = read(tmp_path, *map(bytes, parts))
-    assert times(found) == [0, 1, 3, 4, 5] and "unreadable bytes" in found.losses[0]
+    file = read(tmp_path, *map(bytes, parts))
+    assert times(file) == [0, 1, 3, 4, 5] and "unreadable bytes" in file.losses[0]
 
 
 def test_a_chunk_without_the_checksum_that_others_have_is_not_believed(tmp_path) -> None:
-    found = read(tmp_path, chunk([SCHEMA, channel(), message(0)]), chunk([message(3)], crc=0))
-    assert times(found) == [0] and found.losses == ["1 damaged chunk dropped: 3.00 to 4.00 s"]
+    file = read(tmp_path, chunk([SCHEMA, channel(), message(0)]), chunk([message(3)], crc=0))
+    assert times(file) == [0] and file.losses == ["1 damaged chunk dropped: 3.00 to 4.00 s"]
     bare = [chunk([SCHEMA, channel(), message(0)], crc=0), chunk([message(3)], crc=0)]
-    found = read(tmp_path, *bare)
-    assert times(found) == [0, 3] and found.losses == []
-    assert found.notes == ["no checksums in the file: damage to its messages would not be noticed"]
+    file = read(tmp_path, *bare)
+    assert times(file) == [0, 3] and file.losses == []
+    assert file.notes == ["no checksums in the file: damage to its messages would not be noticed"]
 
 
 def test_the_checksum_of_an_unchunked_file(tmp_path) -> None:
@@ -141,8 +141,8 @@ def test_the_checksum_of_an_unchunked_file(tmp_path) -> None:
         for k in range(5):
             writer.add_message(number, START + k * 10**9, b"12345678", START)
         writer.finish()
-    found = read_container(path)
-    assert times(found) == [0, 1, 2, 3, 4] and (found.losses, found.notes) == ([], [])
+    contents = read_container(path)
+    assert times(contents) == [0, 1, 2, 3, 4] and (contents.losses, contents.notes) == ([], [])
     path.write_bytes(path.read_bytes().replace(b"12345678", b"12345679", 1))
     assert read_container(path).losses == [
         "the checksum of all messages together does not hold: what is damaged is not known"
@@ -151,21 +151,21 @@ def test_the_checksum_of_an_unchunked_file(tmp_path) -> None:
 
 def test_one_topic_in_two_channels_is_one(tmp_path) -> None:
     records = [SCHEMA, channel(1), channel(2), message(0, 1), message(1, 2)]
-    found = read(tmp_path, chunk(records))
-    assert len(found.channels) == 1 and times(found) == [0, 1]
+    file = read(tmp_path, chunk(records))
+    assert len(file.channels) == 1 and times(file) == [0, 1]
 
 
 def test_what_cannot_be_joined_is_said(tmp_path) -> None:
-    found = read(tmp_path, chunk([SCHEMA, channel(), message(0), message(1, 7)]))
-    assert found.losses == ["1 message of channel 7 dropped: no record says what it is"]
-    found = read(tmp_path, chunk([channel(), message(0)]))
-    assert found.losses == ["1 message of /x dropped: its schema is missing"]
+    file = read(tmp_path, chunk([SCHEMA, channel(), message(0), message(1, 7)]))
+    assert file.losses == ["1 message of channel 7 dropped: no record says what it is"]
+    file = read(tmp_path, chunk([channel(), message(0)]))
+    assert file.losses == ["1 message of /x dropped: its schema is missing"]
     twice = [SCHEMA, channel(), message(0), channel(1, "/y"), message(1), message(2)]
-    found = read(tmp_path, chunk(twice))
-    assert times(found) == [0]
-    assert found.losses == ["channel 1 is /x and then another: 2 messages dropped since"]
-    found = read(tmp_path, chunk([channel(schema=0), message(0)]))
-    assert times(found) == [0] and found.channels[0].schema.name == "" and found.losses == []
+    file = read(tmp_path, chunk(twice))
+    assert times(file) == [0]
+    assert file.losses == ["channel 1 is /x and then another: 2 messages dropped since"]
+    file = read(tmp_path, chunk([channel(schema=0), message(0)]))
+    assert times(file) == [0] and file.channels[0].schema.name == "" and file.losses == []
 
 
 @pytest.mark.parametrize("summary", [True, False])
@@ -193,26 +193,26 @@ def test_counts_of_the_file_are_compared(tmp_path, summary) -> None:
 
 def test_a_damaged_end_costs_nothing(tmp_path) -> None:
     data = [chunk([SCHEMA, channel(), message(0)])]
-    found = read(tmp_path, *data, end=[kinds.DataEnd(0), b"\x0b\xff\xff"])
-    assert times(found) == [0] and found.losses == []
-    assert "summary at the file's end is damaged" in found.notes[0]
-    found = read(tmp_path, *data, end=[])
-    assert times(found) == [0]
-    assert found.losses[0] == "the file has no end: cut off after 0.00 s"
+    file = read(tmp_path, *data, end=[kinds.DataEnd(0), b"\x0b\xff\xff"])
+    assert times(file) == [0] and file.losses == []
+    assert "summary at the file's end is damaged" in file.notes[0]
+    file = read(tmp_path, *data, end=[])
+    assert times(file) == [0]
+    assert file.losses[0] == "the file has no end: cut off after 0.00 s"
 
 
 def test_records_of_applications_are_said(tmp_path) -> None:
-    found = read(
+    file = read(
         tmp_path, b"\x90" + struct.pack("<Q", 3) + b"abc", chunk([SCHEMA, channel(), message(0)])
     )
-    assert times(found) == [0]
-    assert found.losses == ["1 record(s) of kinds that are not MCAP's own passed over"]
+    assert times(file) == [0]
+    assert file.losses == ["1 record(s) of kinds that are not MCAP's own passed over"]
 
 
 def test_large_types_that_no_role_has_are_counted_only(tmp_path) -> None:
     cloud = kinds.Schema(id=1, data=b"", encoding="ros2msg", name="sensor_msgs/msg/PointCloud2")
-    found = read(tmp_path, chunk([cloud, channel(), message(0)]))
-    assert found.channels[0].payloads == [b""] and times(found) == [0]
+    file = read(tmp_path, chunk([cloud, channel(), message(0)]))
+    assert file.channels[0].payloads == [b""] and times(file) == [0]
 
 
 def test_cameras_that_play_no_role_give_way_where_a_file_is_too_large(
@@ -223,11 +223,11 @@ def test_cameras_that_play_no_role_give_way_where_a_file_is_too_large(
     idle, used = bytes(1000), bytes(300)
     topics = [SCHEMA, channel(), channel(2, "/camera/infra1/image_raw"), channel(3, "/airy")]
     sent = [message(k, 1 + k % 2, (used, idle)[k % 2]) for k in range(6)]
-    found = read(tmp_path, *topics, *sent, message(6, 3))
-    retained = {one.topic: {*map(len, one.payloads)} for one in found.channels}
+    file = read(tmp_path, *topics, *sent, message(6, 3))
+    retained = {channel_i.topic: {*map(len, channel_i.payloads)} for channel_i in file.channels}
     assert retained == {"/x": {300}, "/camera/infra1/image_raw": {0}, "/airy": {8}}
-    assert times(found, "/camera/infra1/image_raw") == [1, 3, 5]
-    assert any("without those of /camera/infra1/image_raw" in note for note in found.notes)
+    assert times(file, "/camera/infra1/image_raw") == [1, 3, 5]
+    assert any("without those of /camera/infra1/image_raw" in note for note in file.notes)
     with pytest.raises(UserError, match="holds more than"):
         read(tmp_path, *topics, *(message(k, 1, idle) for k in range(3)))
 
@@ -309,12 +309,12 @@ records = st.one_of(
 @given(st.lists(records, max_size=12))
 def test_any_stream_of_records(tmp_path, stream) -> None:
     try:
-        found = read(tmp_path, *stream)
+        file = read(tmp_path, *stream)
     except UserError as error:
         assert "\n" not in str(error)
         return
-    for one in found.channels:
-        assert len(one.log_times) == len(one.payloads) > 0
+    for channel_i in file.channels:
+        assert len(channel_i.log_times) == len(channel_i.payloads) > 0
 
 
 @ANY
@@ -322,6 +322,6 @@ def test_any_stream_of_records(tmp_path, stream) -> None:
     st.permutations([SCHEMA, channel(1), channel(2, "/y"), *map(message, range(4)), message(4, 2)])
 )
 def test_any_order_of_intact_records(tmp_path, stream) -> None:
-    found = read(tmp_path, *(chunk([one]) for one in stream))
-    assert found.losses == []
-    assert sorted(times(found)) == [0, 1, 2, 3] and times(found, "/y") == [4]
+    file = read(tmp_path, *(chunk([record]) for record in stream))
+    assert file.losses == []
+    assert sorted(times(file)) == [0, 1, 2, 3] and times(file, "/y") == [4]

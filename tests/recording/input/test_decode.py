@@ -59,8 +59,8 @@ def channel(name: str, encoding: str, data: bytes, messages: str) -> Channel:
     return Channel("/ft", Schema(1, data, encoding, name), messages)
 
 
-def reading(one: Channel, payload: bytes):
-    return read_wrench(decoder(one)(payload))
+def reading(source: Channel, payload: bytes):
+    return read_wrench(decoder(source)(payload))
 
 
 def cdr() -> bytes:
@@ -80,8 +80,8 @@ def cdr() -> bytes:
     ],
 )
 def test_ros_2(name, encoding, text) -> None:
-    found = reading(channel(name, encoding, text.encode(), "cdr"), cdr())
-    assert found == (12_000_000_034, "sensor", (1.5, -2.0, 3.25))
+    sample = reading(channel(name, encoding, text.encode(), "cdr"), cdr())
+    assert sample == (12_000_000_034, "sensor", (1.5, -2.0, 3.25))
 
 
 def test_ros_1() -> None:
@@ -89,8 +89,8 @@ def test_ros_1() -> None:
     frame = b"/sensor"  # ROS 1 has a slash before it
     payload = struct.pack("<IIII", 7, 12, 34, len(frame)) + frame
     payload += struct.pack("<6d", 1.5, -2.0, 3.25, 0, 0, 0)
-    one = channel("geometry_msgs/WrenchStamped", "ros1msg", ROS1.encode(), "ros1")
-    assert reading(one, payload) == (12_000_000_034, "sensor", (1.5, -2.0, 3.25))
+    source = channel("geometry_msgs/WrenchStamped", "ros1msg", ROS1.encode(), "ros1")
+    assert reading(source, payload) == (12_000_000_034, "sensor", (1.5, -2.0, 3.25))
 
 
 @pytest.mark.parametrize(
@@ -106,8 +106,8 @@ def test_ros_1() -> None:
 def test_json_of_ros_and_of_foxglove(head) -> None:
     force = {"x": 1.5, "y": -2, "z": 3.25}
     payload = json.dumps({**head, "wrench": {"force": force, "torque": force}}).encode()
-    one = channel("lab.WrenchStamped", "jsonschema", b"{}", "json")
-    assert reading(one, payload) == (12_000_000_034, "sensor", (1.5, -2.0, 3.25))
+    source = channel("lab.WrenchStamped", "jsonschema", b"{}", "json")
+    assert reading(source, payload) == (12_000_000_034, "sensor", (1.5, -2.0, 3.25))
 
 
 def test_protobuf_of_foxglove() -> None:
@@ -115,12 +115,20 @@ def test_protobuf_of_foxglove() -> None:
     schema = fox.PoseInFrame.get_schema()
     files = FileDescriptorSet.FromString(schema.data)
     files.file.extend([files.file.pop(0)])
-    one = channel("foxglove.PoseInFrame", "protobuf", files.SerializeToString(), "protobuf")
+    source = channel("foxglove.PoseInFrame", "protobuf", files.SerializeToString(), "protobuf")
     pose = fox.Pose(position=fox.Vector3(x=1.5, y=-2.0, z=3.25))
     payload = fox.PoseInFrame(timestamp=fox.Timestamp(12, 34), frame_id="base", pose=pose).encode()
-    found = decoder(one)(payload)
-    assert (found.frame_id, found.timestamp.seconds, found.timestamp.nanos) == ("base", 12, 34)
-    assert (found.pose.position.x, found.pose.position.y, found.pose.position.z) == (1.5, -2, 3.25)
+    message = decoder(source)(payload)
+    assert (message.frame_id, message.timestamp.seconds, message.timestamp.nanos) == (
+        "base",
+        12,
+        34,
+    )
+    assert (message.pose.position.x, message.pose.position.y, message.pose.position.z) == (
+        1.5,
+        -2,
+        3.25,
+    )
 
 
 NESTED = b"p/A[5000] x\n" + b"=" * 80 + b"\nMSG: p/A\nuint8[5000] y\n"  # 25 million elements
@@ -169,8 +177,8 @@ def test_what_cannot_be_read_is_one_line_with_the_topic(
     ],
 )
 def test_a_standard_type_needs_no_schema(name, encoding, data) -> None:
-    found = reading(channel(name, encoding, data, "cdr"), cdr())
-    assert found.value == (1.5, -2.0, 3.25) and found.frame == "sensor"
+    sample = reading(channel(name, encoding, data, "cdr"), cdr())
+    assert sample.value == (1.5, -2.0, 3.25) and sample.frame == "sensor"
 
 
 def test_types_of_others_do() -> None:
@@ -192,11 +200,11 @@ def test_without_any_schema_bytes_tell_the_type() -> None:
 
 
 def test_messages_that_are_packed_one_by_one() -> None:
-    one = channel(NAME, "ros2msg", MSG.encode(), "cdr")
-    assert reading(one, zstandard.compress(cdr())).value == (1.5, -2.0, 3.25)
+    source = channel(NAME, "ros2msg", MSG.encode(), "cdr")
+    assert reading(source, zstandard.compress(cdr())).value == (1.5, -2.0, 3.25)
     with pytest.raises(Unreadable):
-        decoder(one)(zstandard.compress(cdr())[:-20])
+        decoder(source)(zstandard.compress(cdr())[:-20])
     with pytest.raises(Unreadable, match="too long"):
-        decoder(one)(zstandard.compress(bytes(2**28)))
+        decoder(source)(zstandard.compress(bytes(2**28)))
     with pytest.raises(Unreadable, match="in XCDR2"):
-        decoder(one)(b"\0\7\0\0" + cdr()[4:])
+        decoder(source)(b"\0\7\0\0" + cdr()[4:])

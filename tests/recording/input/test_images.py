@@ -89,9 +89,9 @@ def test_raw_metres(pixels, padding, swapped) -> None:
 def test_unknown_depth_is_zero() -> None:
     unknown = DEPTH.copy()
     unknown[0] = [np.nan, np.inf, -np.inf, -1, 0]
-    found = depth(raw("32FC1", unknown))
-    assert not found[0].any()
-    np.testing.assert_array_equal(found[1:], DEPTH[1:])
+    result = depth(raw("32FC1", unknown))
+    assert not result[0].any()
+    np.testing.assert_array_equal(result[1:], DEPTH[1:])
 
 
 def test_packed_colors_of_another_library() -> None:
@@ -135,8 +135,8 @@ def test_quantised_depth_as_image_transport_writes_it(coder) -> None:
     inverse[2, 3] = 0
     inverse = inverse.astype(np.uint16)
     body = png(inverse) if coder == "png" else run_length(inverse)
-    found = depth(packed(f"32FC1; compressedDepth {coder}", header + body))
-    np.testing.assert_allclose(found, metres, rtol=2e-4)
+    result = depth(packed(f"32FC1; compressedDepth {coder}", header + body))
+    np.testing.assert_allclose(result, metres, rtol=2e-4)
 
 
 def run_length(pixels: np.ndarray) -> bytes:
@@ -174,10 +174,10 @@ def test_rvl_of_a_whole_frame() -> None:
 @example(struct.pack("<II", 1, 1) + b"\xff\xff\xff\x0f" * 2)
 def test_damaged_rvl_is_refused(data) -> None:
     try:
-        found = rvl(np.frombuffer(data, np.uint8))
+        result = rvl(np.frombuffer(data, np.uint8))
     except Undecodable:
         return
-    assert found.dtype == np.uint16 and found.shape[::-1] == struct.unpack_from("<II", data)
+    assert result.dtype == np.uint16 and result.shape[::-1] == struct.unpack_from("<II", data)
 
 
 @QUICK
@@ -196,11 +196,11 @@ def test_mutated_pictures_are_pictures_or_undecodable(seed) -> None:
         data[random.integers(len(data), size=2)] = random.integers(256, size=2)
         data = data[: random.integers(len(data) + 1)] if seed % 2 else data
         try:
-            found = read(Picture("", format, data))
+            result = read(Picture("", format, data))
         except Undecodable as error:
             assert "\n" not in str(error)
         else:
-            assert found.ndim in (2, 3)
+            assert result.ndim in (2, 3)
 
 
 def test_what_a_whole_topic_cannot_be_is_told_from_damage() -> None:
@@ -294,8 +294,8 @@ def test_what_follows_on_a_jpeg_does_not_matter(behind, progressive) -> None:
 def test_depth_of_other_encodings_and_without_what_drivers_leave_out() -> None:
     signed = MILLIMETRES.astype(np.int16)
     signed[0, 0] = -1
-    found = depth(raw("16SC1", signed))
-    assert found[0, 0] == 0 and found[1, 1] == np.float32(MILLIMETRES[1, 1] / 1000)
+    result = depth(raw("16SC1", signed))
+    assert result[0, 0] == 0 and result[1, 1] == np.float32(MILLIMETRES[1, 1] / 1000)
     np.testing.assert_allclose(depth(raw("64FC1", DEPTH.astype(float))), DEPTH)
     assert is_depth(raw("16SC1", signed)) and is_depth(raw("64FC1", DEPTH.astype(float)))
     bare = packed("16UC1; compressedDepth", png(MILLIMETRES))  # no header

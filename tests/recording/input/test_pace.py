@@ -32,7 +32,7 @@ def test_bursts_are_spread_back_to_where_samples_were_taken(size, width, late, l
     end = np.array([true[burst == k][-1] for k in range(burst[-1] + 1)])
     end = end + random.integers(0, late + 1, len(end))
     stamp = end[burst] + (np.arange(len(true)) % size) * min(width, MS // 8 // size)
-    retained = ~np.isin(burst, [one * (burst[-1] // 100) for one in lost])
+    retained = ~np.isin(burst, [number * (burst[-1] // 100) for number in lost])
     stamp, true, values = stamp[retained], true[retained], values[retained]
     even, bursts = pace.without_bursts(stamp, stamp + 100_000, values)
     assert bursts.count == size and bursts.before

@@ -139,17 +139,17 @@ def test_missing_transforms_are_named_and_params_replace_them(tmp_path, params, 
     with pytest.raises(UserError, match="setup.base_to_fork"):
         geometry_of(recording, params.setup)
 
-    known = geometry_of(read(blind[0], params), params.setup)
+    geometry = geometry_of(read(blind[0], params), params.setup)
     poses = {
         name: (*pose.translation, *pose.rotation.as_quat())
         for name, pose in (
-            ("base_to_fork", known.base.inverse()),
-            ("camera_to_fork", known.camera.inverse()),
+            ("base_to_fork", geometry.base.inverse()),
+            ("camera_to_fork", geometry.camera.inverse()),
         )
     }
     given = geometry_of(recording, params.setup.model_copy(update=poses))
-    np.testing.assert_allclose(given.base.apply([1, 2, 3]), known.base.apply([1, 2, 3]))
-    np.testing.assert_allclose(given.camera.apply([1, 2, 3]), known.camera.apply([1, 2, 3]))
+    np.testing.assert_allclose(given.base.apply([1, 2, 3]), geometry.base.apply([1, 2, 3]))
+    np.testing.assert_allclose(given.camera.apply([1, 2, 3]), geometry.camera.apply([1, 2, 3]))
 
 
 def test_files_that_are_no_recordings(tmp_path, params) -> None:

@@ -61,7 +61,7 @@ def fingers(topic: str, **positions: np.ndarray) -> Channel:
 
 def lively(pictures: Channel) -> Channel:
     """The same with another value in each."""
-    data = [one.replace(b"[0", b"[%d" % k) for k, one in enumerate(pictures.payloads)]
+    data = [payload.replace(b"[0", b"[%d" % k) for k, payload in enumerate(pictures.payloads)]
     return replace(pictures, payloads=data)
 
 
@@ -85,7 +85,7 @@ def test_the_arm_that_pulls(params, right, left, rests) -> None:
     """The other one rests, or moves and carries something; its topics have more messages."""
     way = 0 * TIME if rests else wandering(5)
     load = 0 * TIME if rests else 4 * wandering(6)
-    found = chosen(
+    roles = chosen(
         params,
         force(f"/arm_{left}/ft/wrench", load),
         force(f"/arm_{right}/ft/wrench", HELD),
@@ -94,22 +94,22 @@ def test_the_arm_that_pulls(params, right, left, rests) -> None:
         fingers(f"/arm_{left}/gripper", finger=0 * TIME),
         fingers(f"/arm_{right}/gripper", finger=0.04 - 0.03 * CLOSED),
     )
-    assert topics(found) == tuple(f"/arm_{right}/{n}" for n in ("ft/wrench", "pose", "gripper"))
-    assert not any(choice.doubt for choice in found.values())
+    assert topics(roles) == tuple(f"/arm_{right}/{n}" for n in ("ft/wrench", "pose", "gripper"))
+    assert not any(choice.doubt for choice in roles.values())
 
 
 def test_names_tell_by_frames_alone_and_motion_where_names_do_not(params) -> None:
-    found = chosen(
+    roles = chosen(
         params,
         force("/ft_a", HELD, "right_sensor"),
         hand("/p/state", wandering(1), "left_base"),
         hand("/q/state", DRAW, "right_base"),
     )
-    assert topics(found) == ("/ft_a", "/q/state")
-    found = chosen(
+    assert topics(roles) == ("/ft_a", "/q/state")
+    roles = chosen(
         params, force("/ft", HELD), hand("/kuka/state", wandering(1)), hand("/ur/pose", DRAW)
     )
-    assert topics(found) == ("/ft", "/ur/pose")
+    assert topics(roles) == ("/ft", "/ur/pose")
 
 
 def test_the_force_of_one_arm_is_not_used_with_the_pose_of_another(params) -> None:
@@ -121,27 +121,27 @@ def test_the_force_of_one_arm_is_not_used_with_the_pose_of_another(params) -> No
         "/right_arm/wrench",
         "/left_arm/pose",
     )
-    found = chosen(
+    roles = chosen(
         params,
         force("/right_arm/wrench", HELD),
         hand("/right_arm/pose", DRAW),
         fingers("/left_arm/gripper", finger=0.04 - 0.03 * CLOSED),
     )
-    assert "gripper" not in found
+    assert "gripper" not in roles
 
 
 def test_two_sets_that_tie_are_said(params) -> None:
-    found = chosen(
+    roles = chosen(
         params,
         *(force(f"/arm_{n}/wrench", HELD) for n in (1, 2)),
         *(hand(f"/arm_{n}/pose", DRAW) for n in (1, 2)),
     )
-    assert topics(found) == ("/arm_1/wrench", "/arm_1/pose")
-    assert found["pose"].doubt == "/arm_2/wrench with /arm_2/pose shows a release too"
+    assert topics(roles) == ("/arm_1/wrench", "/arm_1/pose")
+    assert roles["pose"].doubt == "/arm_2/wrench with /arm_2/pose shows a release too"
 
 
 def test_a_dead_topic_does_not_beat_a_live_one(params) -> None:
-    found = chosen(
+    roles = chosen(
         params,
         force("/ft_sensor/wrench_force", 0 * TIME, noise=0.0),
         force("/bus/wrench", HELD),
@@ -150,10 +150,10 @@ def test_a_dead_topic_does_not_beat_a_live_one(params) -> None:
         fingers("/gripper/gripper_states", finger=0 * TIME),
         fingers("/joints", finger_joint=0.8 * CLOSED),
     )
-    assert topics(found) == ("/bus/wrench", "/state", "/joints")
+    assert topics(roles) == ("/bus/wrench", "/state", "/joints")
     noisy = force("/ft_sensor/wrench_force", 0 * TIME)
-    found = chosen(params, noisy, force("/external/wrench", HELD), hand("/state", DRAW))
-    assert topics(found)[0] == "/external/wrench"
+    roles = chosen(params, noisy, force("/external/wrench", HELD), hand("/state", DRAW))
+    assert topics(roles)[0] == "/external/wrench"
 
 
 def test_the_camera_with_depth(params) -> None:
@@ -164,47 +164,47 @@ def test_the_camera_with_depth(params) -> None:
     pull = force("/ft", HELD), hand("/pose", DRAW)
     assert chosen(params, *pull, *webcam)["color"].channel.topic == "/cam/color/image"
     pairs = [
-        one
+        channel_i
         for n in (1, 2)
         for kind, encoding in (("color", "rgb8"), ("depth", "16UC1"))
-        for one in (
+        for channel_i in (
             lively(picture(f"/cam{n}/{kind}/image", encoding, f"{kind}{n}")),
             info(f"/cam{n}/{kind}/camera_info", f"{kind}{n}"),
         )
     ]
-    found = chosen(params, *pull, camera=pairs)
-    assert [found[role].channel.topic for role in ("color", "depth")] == [
+    roles = chosen(params, *pull, camera=pairs)
+    assert [roles[role].channel.topic for role in ("color", "depth")] == [
         "/cam1/color/image",
         "/cam1/depth/image",
     ]
-    assert found["color"].doubt == "/cam2/color/image with /cam2/depth/image is a camera too"
+    assert roles["color"].doubt == "/cam2/color/image with /cam2/depth/image is a camera too"
 
 
 def opening(params, **positions: np.ndarray) -> np.ndarray:
     """What becomes of the fingers in one topic, less its first value."""
-    found = chosen(params, force("/ft", HELD), hand("/p", DRAW), fingers("/joints", **positions))
-    choice = found["gripper"]
+    roles = chosen(params, force("/ft", HELD), hand("/p", DRAW), fingers("/joints", **positions))
+    choice = roles["gripper"]
     values = [choice.read(payload) for payload in choice.channel.payloads]
-    stamps = np.array([one.stamp for one in values])
+    stamps = np.array([sample.stamp for sample in values])
     assert choice.convert is not None
-    value = choice.convert(stamps, np.array([one.value for one in values], float))
+    value = choice.convert(stamps, np.array([sample.value for sample in values], float))
     assert value.shape == (COUNT, 1)
     return value[:, 0] - value[0, 0]
 
 
 def test_fingers_of_any_sign_and_of_two_devices(params) -> None:
-    one = 0.04 - 0.03 * CLOSED
+    finger = 0.04 - 0.03 * CLOSED
     other = 0.04 - 0.035 * ((TIME > 2.5) & (TIME < 4))  # closes and opens, but not at the release
     for positions in (
-        {"left_finger": one, "right_finger": one},
-        {"left_finger": one, "right_finger": -one},
-        {"left_panda_finger1": other, "right_panda_finger1": one, "right_panda_finger2": one},
-        {"a_finger": one, "a_other_finger": one, "b_finger": 0 * TIME},
+        {"left_finger": finger, "right_finger": finger},
+        {"left_finger": finger, "right_finger": -finger},
+        {"left_panda_finger1": other, "right_panda_finger1": finger, "right_panda_finger2": finger},
+        {"a_finger": finger, "a_other_finger": finger, "b_finger": 0 * TIME},
     ):
         np.testing.assert_allclose(opening(params, **positions), -0.06 * CLOSED, atol=1e-12)
     arm = {f"joint{k}": wandering(k) for k in range(6)}
-    found = opening(params, **arm, finger_joint=0.8 * CLOSED)
-    np.testing.assert_allclose(found, 0.8 * CLOSED)
+    result = opening(params, **arm, finger_joint=0.8 * CLOSED)
+    np.testing.assert_allclose(result, 0.8 * CLOSED)
 
 
 @settings(max_examples=40, deadline=None, derandomize=True)
@@ -215,8 +215,8 @@ def test_a_fall_is_found_where_it_is_and_noise_has_none(seed, noise, release) ->
     stamps = (1e9 * TIME).astype(np.int64)
     assert sets.fall_of(sets.Track(TIME, stamps, values)) is None
     values[:, 1] += 6 * ((TIME > release / 2) & (TIME < release))
-    found = sets.fall_of(sets.Track(TIME, stamps, values))
-    assert found is not None and abs(TIME[found] - release) < 0.06
+    fall = sets.fall_of(sets.Track(TIME, stamps, values))
+    assert fall is not None and abs(TIME[fall] - release) < 0.06
 
 
 def test_the_cameras_of_the_others_stay(params) -> None:

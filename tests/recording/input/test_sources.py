@@ -42,11 +42,11 @@ def test_a_pose_with_covariance(params) -> None:
     ]
     kind = "geometry_msgs/msg/PoseWithCovarianceStamped"
     choice = chosen(params, wrench("/ft"), channel("/ee", kind, messages))["pose"]
-    frame, found = played(choice)
+    frame, values = played(choice)
     assert (
         frame == "base" and choice.why == "the only PoseWithCovarianceStamped for end-effector pose"
     )
-    assert_poses(found)
+    assert_poses(values)
 
 
 def robot_state(topic: str = "/franka_robot_state_broadcaster/robot_state") -> Channel:
@@ -73,17 +73,17 @@ def robot_state(topic: str = "/franka_robot_state_broadcaster/robot_state") -> C
 def _named(value: object) -> object:
     if not isinstance(value, dict):
         return value
-    return SimpleNamespace(**{name: _named(one) for name, one in value.items()})
+    return SimpleNamespace(**{name: _named(part) for name, part in value.items()})
 
 
 def test_a_franka_robot_state_is_pose_and_for_lack_of_a_sensor_force(params) -> None:
     roles = chosen(params, robot_state())
-    frame, found = played(roles["pose"])
+    frame, values = played(roles["pose"])
     assert frame == "link0"
-    assert_poses(found)
-    frame, found = played(roles["wrench"])
+    assert_poses(values)
+    frame, values = played(roles["wrench"])
     assert frame == "link0"
-    np.testing.assert_array_equal(found, [[1, 2, 3]] * COUNT)
+    np.testing.assert_array_equal(values, [[1, 2, 3]] * COUNT)
     assert roles["wrench"].why == "the only FrankaRobotState for force"
 
     with_sensor = chosen(params, robot_state(), wrench("/external_wrench"))
@@ -141,9 +141,9 @@ def test_joint_states_through_a_urdf(params, gantry) -> None:
     arm = joints("/joint_states", names, positions)
     gripper = joints("/gripper/joint_states", ["finger_joint1"], gantry[:, :1])
     roles = chosen(params, wrench("/ft"), gripper, arm, urdf="gantry.urdf")
-    frame, found = played(roles["pose"])
+    frame, values = played(roles["pose"])
     assert frame == "bench" and roles["pose"].channel.topic == "/joint_states"
-    assert_poses(found)
+    assert_poses(values)
     assert roles["gripper"].channel.topic == "/gripper/joint_states"
 
     alone = chosen(params, wrench("/ft"), arm, urdf="gantry.urdf")
@@ -156,7 +156,9 @@ def test_arm_and_gripper_that_share_a_topic(params, gantry) -> None:
     """Each is read from its own messages; the other's raise, for the caller to leave out."""
     arm = joints("/joint_states", [name for name, *_ in GANTRY], gantry)
     fingers = joints("/joint_states", ["left_finger", "right_finger"], gantry[:, :2])
-    both = [one for pair in zip(fingers.payloads, arm.payloads, strict=True) for one in pair]
+    both = [
+        message for pair in zip(fingers.payloads, arm.payloads, strict=True) for message in pair
+    ]
     shared = Channel("/joint_states", arm.schema, "json", sorted(arm.log_times * 2), both)
     roles = chosen(params, wrench("/ft"), shared, urdf="gantry.urdf")
     assert len(roles["pose"].read(both[1]).value) == 6
@@ -169,11 +171,11 @@ def test_arm_and_gripper_that_share_a_topic(params, gantry) -> None:
 def test_a_twist_alone_from_a_start_pose(params) -> None:
     start = (*PLACES[0], 0, 0, 0, 1)
     roles = chosen(params, wrench("/ft"), twist("/ee_twist"), start_pose=start)
-    frame, found = played(roles["pose"])
+    frame, values = played(roles["pose"])
     assert frame == "base"
-    np.testing.assert_allclose(found[:, :3], PLACES, atol=1e-5)
+    np.testing.assert_allclose(values[:, :3], PLACES, atol=1e-5)
     turned = Rotation.from_rotvec(np.outer(TIMES, [1, 2, 3]))
-    assert (turned.inv() * Rotation.from_quat(found[:, 3:])).magnitude().max() < 1e-9
+    assert (turned.inv() * Rotation.from_quat(values[:, 3:])).magnitude().max() < 1e-9
     assert roles["twist"].channel.topic == "/ee_twist"
 
 

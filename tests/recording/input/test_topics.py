@@ -56,9 +56,9 @@ def test_the_topics_of_a_realsense(params) -> None:
     frames = {"color": "color", "aligned_depth_to_color": "color", "depth": "d", "infra1": "d"}
     encodings = {"color": "rgb8", "infra1": "mono16"}
     camera = [
-        one
+        channel
         for name, frame in frames.items()
-        for one in (
+        for channel in (
             picture(f"/cam/{name}/image_raw", encodings.get(name, "16UC1"), frame),
             info(f"/cam/{name}/camera_info", frame),
         )
@@ -99,7 +99,9 @@ def test_each_camera_has_its_own_info(params) -> None:
 
 def test_a_damaged_first_message_does_not_decide(params) -> None:
     color, color_info, depth, depth_info = CAMERA
-    bad_info, bad_depth = (replace(one, payloads=list(one.payloads)) for one in (depth_info, depth))
+    bad_info, bad_depth = (
+        replace(channel, payloads=list(channel.payloads)) for channel in (depth_info, depth)
+    )
     bad_info.payloads = [depth_info.payloads[0].replace(b"40.0", b"-4.0"), *depth_info.payloads * 2]
     bad_depth.payloads[0] = depth.payloads[0].replace(b"16UC1", b"16QC1")
     bad_info.log_times = [0] * len(bad_info.payloads)
@@ -115,15 +117,15 @@ def test_registered_depth_may_use_the_colour_cameras(params) -> None:
 
 
 @pytest.mark.parametrize(
-    ("depth", "about"),
+    ("depth", "words"),
     [
         (picture("/cam/depth/image", "16UC1", "depth"), "info"),
         (picture("/cam/depth/image", "16UC1", "color", 8, 4), "8 x 4"),
     ],
 )
-def test_unregistered_depth_must_not_use_the_colour_cameras(params, depth, about) -> None:
+def test_unregistered_depth_must_not_use_the_colour_cameras(params, depth, words) -> None:
     color, color_info, *_ = CAMERA
-    with pytest.raises(UserError, match=f"no camera info of the depth.*{about}"):
+    with pytest.raises(UserError, match=f"no camera info of the depth.*{words}"):
         cameras(params, color, color_info, depth)
     one_folder = [picture("/cam/color", "rgb8", "color"), picture("/cam/depth", "16UC1", "depth")]
     with pytest.raises(UserError, match="no camera info of the depth"):

@@ -26,7 +26,7 @@ def test_foxglove_transforms_that_keep_still_are_static() -> None:
     still = [edge("base", "fork", 0.5, k) for k in range(5)]
     once = {"transforms": [edge("fork", "camera", 0.25, 0)]}
     many = channel("/tf", "foxglove.FrameTransform", [*moving, *still])
-    one = channel("/tf2", "foxglove.FrameTransforms", [once])
-    tree = transforms_of(Container(Path("f.mcap"), [many, one], []))
+    batch = channel("/tf2", "foxglove.FrameTransforms", [once])
+    tree = transforms_of(Container(Path("f.mcap"), [many, batch], []))
     np.testing.assert_allclose(tree.between("base", "camera").translation, [0.75, 0, 0])
     assert tree.between("base", "hand") is None

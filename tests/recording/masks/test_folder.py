@@ -39,7 +39,9 @@ def files(recording: Path) -> list[Path]:
 
 
 def test_the_same_masks_give_the_same_episode_to_the_byte(masked, params, by_folder) -> None:
-    ours, theirs = (build_episodes(masked, "band1", one)[0][0] for one in (params, by_folder))
+    ours, theirs = (
+        build_episodes(masked, "band1", params_i)[0][0] for params_i in (params, by_folder)
+    )
     for name in ("time", "position", "velocity", "force", "opening", "cloud_time", "camera"):
         assert getattr(ours, name).tobytes() == getattr(theirs, name).tobytes()
     assert [cloud.tobytes() for cloud in ours.clouds] == [
@@ -57,7 +59,8 @@ def test_each_mask_counts_for_its_own_picture_and_no_other(mine, params, by_fold
     Image.fromarray(np.zeros_like(whole)).save(black)
     Image.fromarray(np.asarray(Image.open(files(mine)[21])) > 0).save(files(mine)[21])
     ours, theirs = (
-        process_pulls(mine, params.bands["band1"], one)[0][0] for one in (params, by_folder)
+        process_pulls(mine, params.bands["band1"], params_i)[0][0]
+        for params_i in (params, by_folder)
     )
     expected = ours.clouds.pixels.copy()
     expected[20] = 0
@@ -95,11 +98,11 @@ def test_masks_are_warped_to_a_depth_camera_of_its_own(tmp_path) -> None:
         cv2.imwrite(str(tmp_path / "look.masks" / f"{stamp}.png"), orange)
     mask, hits, wrong = masker("folder", view), [], []
     for number, frame in view.frames():
-        found = mask.mask(frame)
+        pixels = mask.mask(frame)
         band = truths[number].part[view.window] == looks.BAND
         band &= np.abs(frame.depth - truths[number].depth[view.window]) < 0.005
-        hits.append((found & band).sum() / band.sum())
-        wrong.append((found & ~band & (frame.depth > 0)).sum() / found.sum())
+        hits.append((pixels & band).sum() / band.sum())
+        wrong.append((pixels & ~band & (frame.depth > 0)).sum() / pixels.sum())
     assert np.mean(hits) > 0.8 and np.mean(wrong) < 0.2
 
 
@@ -164,6 +167,6 @@ def test_masks_of_the_first_pull_alone_leave_the_second_out(masked, tmp_path, by
     path = tmp_path / "masked.mcap"
     joined(path, [masked, masked])
     shutil.copytree(masked.with_suffix(".masks"), tmp_path / "masked.masks")
-    found, refused = build_episodes(path, "band1", by_folder)
-    assert len(found) == 1 and len(refused) == 1
+    episodes, refused = build_episodes(path, "band1", by_folder)
+    assert len(episodes) == 1 and len(refused) == 1
     assert "pull 2 of 2: " in str(refused[0]) and "masks of 54 of 54" in str(refused[0])

@@ -40,25 +40,25 @@ def cloud():
 @pytest.mark.parametrize("name", QUICK)
 def test_clouds_lie_on_the_band_and_cover_it(name, cloud) -> None:
     view, truths = looks.view_of(LOOKS[name], looks.times(FRAMES))
-    found = figures(view, truths, clouds_of(view, cloud))
-    assert set(found) == {*PHASES, "all"}
-    assert found["all"]["median_off_m"] <= 0.003
-    assert found["all"]["covered"] >= 0.9
-    assert found["all"]["further_than_1cm"] <= 0.01
+    result = figures(view, truths, clouds_of(view, cloud))
+    assert set(result) == {*PHASES, "all"}
+    assert result["all"]["median_off_m"] <= 0.003
+    assert result["all"]["covered"] >= 0.9
+    assert result["all"]["further_than_1cm"] <= 0.01
     for phase in PHASES:
-        assert found[phase]["median_off_m"] <= 0.003
-        assert found[phase]["covered"] >= 0.8
-        assert found[phase]["further_than_1cm"] <= 0.05
+        assert result[phase]["median_off_m"] <= 0.003
+        assert result[phase]["covered"] >= 0.8
+        assert result[phase]["further_than_1cm"] <= 0.05
 
 
 def test_a_hand_that_is_not_seen_alone_is_left_out_with_more_room(cloud) -> None:
     """It turns, so what is learned of it in one picture does not fit the next."""
     view, truths = looks.view_of(LOOKS["near white beside a white arm"], looks.times(FRAMES))
     view.scene.signals.facts.turn = 0.5
-    found = figures(view, truths, clouds_of(view, cloud))
-    assert found["all"]["median_off_m"] <= 0.003
-    assert found["all"]["covered"] >= 0.85
-    assert found["all"]["further_than_1cm"] <= 0.01
+    result = figures(view, truths, clouds_of(view, cloud))
+    assert result["all"]["median_off_m"] <= 0.003
+    assert result["all"]["covered"] >= 0.85
+    assert result["all"]["further_than_1cm"] <= 0.01
 
 
 def test_shadows_are_not_the_band() -> None:

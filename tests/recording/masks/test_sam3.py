@@ -42,10 +42,10 @@ def test_masks_are_what_the_model_sees_where_the_band_can_be(weights, view) -> N
     mask = masker("sam3", view, settings(weights))
     again = masker("sam3", view, settings(weights))
     for number, frame in view.frames():
-        found = mask.mask(frame)
-        assert found.shape == frame.depth.shape and found.dtype == bool
-        assert not (found & ~frame.near).any()
-        np.testing.assert_array_equal(found, again.mask(frame))
+        pixels = mask.mask(frame)
+        assert pixels.shape == frame.depth.shape and pixels.dtype == bool
+        assert not (pixels & ~frame.near).any()
+        np.testing.assert_array_equal(pixels, again.mask(frame))
         # Pixel by pixel: the model's picture, stretched over the colour picture, above 0.
         logits = mask.logits[number]
         assert logits.shape == (32, 32)
@@ -70,11 +70,11 @@ def test_masks_are_warped_to_a_depth_camera_of_its_own(weights) -> None:
         color = view.color(number).astype(int)
         orange = (color[..., 2] - color[..., 0] > 50).astype(np.float32)
         mask.logits[number] = orange * 10 - 5
-        found = mask.mask(frame)
+        pixels = mask.mask(frame)
         band = truths[number].part[view.window] == looks.BAND
         band &= np.abs(frame.depth - truths[number].depth[view.window]) < 0.005
-        hits += (found & band).sum() / band.sum() / len(view)
-        wrong += (found & ~band & (frame.depth > 0)).sum() / max(1, found.sum()) / len(view)
+        hits += (pixels & band).sum() / band.sum() / len(view)
+        wrong += (pixels & ~band & (frame.depth > 0)).sum() / max(1, pixels.sum()) / len(view)
     assert hits > 0.8
     assert wrong < 0.2  # edges: the extrinsics are off by a millimetre, JPEG blurs colours
 

@@ -74,8 +74,8 @@ def test_nothing_speaks_against_a_good_band() -> None:
 
 @pytest.mark.parametrize(("change", "verdict", "words"), CASES)
 def test_one_thing_turns_the_verdict(change, verdict, words) -> None:
-    found, reasons = judge(replace(GOOD, **change))
-    assert found == verdict
+    result, reasons = judge(replace(GOOD, **change))
+    assert result == verdict
     assert len(reasons) == 1 and words in reasons[0].text
     assert reasons[0].against == (verdict == NO)
 
@@ -100,9 +100,9 @@ def test_several_misses_ask_for_mass_and_size_first() -> None:
 
 @pytest.mark.parametrize(("density", "requested"), [(1000.0, False), (833.0, True), (1400.0, True)])
 def test_a_density_that_no_solid_rubber_has_is_asked_about(density, requested) -> None:
-    found = replace(GOOD, density=density)
-    assert bool(question(found)) is requested and judge(found) == (TRUSTED, [])
-    assert not requested or f"{density:.0f} kg/m³" in question(found)
+    case = replace(GOOD, density=density)
+    assert bool(question(case)) is requested and judge(case) == (TRUSTED, [])
+    assert not requested or f"{density:.0f} kg/m³" in question(case)
     assert question(replace(GOOD, density=None)) == ""
 
 
@@ -111,8 +111,8 @@ def test_one_launch_is_called_one() -> None:
         "14 of 15 virtual launches landed inside their 90 % intervals, -1.0 % from the prediction"
         " in the mean."
     )
-    one = replace(GOOD, scores=1, outside=0, kind="measured")
-    assert "The one measured launch landed inside" in reasons_of(one, [])[-1]
+    single = replace(GOOD, scores=1, outside=0, kind="measured")
+    assert "The one measured launch landed inside" in reasons_of(single, [])[-1]
     assert "One launch is part of the evidence" in reasons_of(replace(GOOD, observed=1), [])[-1]
 
 
@@ -127,20 +127,20 @@ def test_the_weight_that_the_hand_carries(summary) -> None:
 
 
 def test_findings_are_those_of_the_files(summary) -> None:
-    found = findings(summary)
-    assert found.settled and found.force == 0.05 and found.recoil == 2e-3
-    assert (found.outside, found.scores, found.kind) == (0, 2, "measured")
-    assert found.off == pytest.approx(0.02)
-    assert found.at_sides == []
+    result = findings(summary)
+    assert result.settled and result.force == 0.05 and result.recoil == 2e-3
+    assert (result.outside, result.scores, result.kind) == (0, 2, "measured")
+    assert result.off == pytest.approx(0.02)
+    assert result.at_sides == []
     half = np.hypot(0.1375, np.linalg.norm(summary.aims.draw, axis=1))
-    assert found.stretch == pytest.approx(2 * half.max() / 0.52, rel=1e-6)
-    assert found.recorded_stretch == pytest.approx(2 * np.hypot(0.1375, 0.38) / 0.52, rel=1e-3)
+    assert result.stretch == pytest.approx(2 * half.max() / 0.52, rel=1e-6)
+    assert result.recorded_stretch == pytest.approx(2 * np.hypot(0.1375, 0.38) / 0.52, rel=1e-3)
 
 
 def test_findings_tell_what_was_odd_of_a_recording(summary) -> None:
-    about = {"about": "gap", "what": "/a*b <x> has a gap of 0.1 s", "cure": "record it again"}
+    caution = {"about": "gap", "what": "/a*b <x> has a gap of 0.1 s", "cure": "record it again"}
     source = {"file": "a.mcap", "pull": 2}
-    odd = replace(summary.episode, metadata={"input": source, "cautions": [about]})
+    odd = replace(summary.episode, metadata={"input": source, "cautions": [caution]})
     sound = replace(odd, metadata={"input": source})
     assert findings(replace(summary, episodes=[sound])).cautions == []
     assert findings(replace(summary, episodes=[sound, odd])).cautions == [
@@ -161,13 +161,13 @@ def test_findings_see_a_bad_score_a_side_and_odd_evidence(summary) -> None:
         for force in (0.1, 0.3)
     ]
     theta["confidence"] = theta["confidence"] | {"launches": launches, "recordings": recordings}
-    found = findings(replace(summary, trials=rows, theta=theta))
-    assert (found.outside, found.left, found.force) == (1, 0.07, 0.3)
-    assert (found.observed, found.surprising) == (1, 1)
-    assert found.bias == pytest.approx(np.mean([1.5 / 1.92, 2.1 / 2.08]) - 1)
-    assert found.bias_of_half == pytest.approx(np.mean([-4.2, 0.2]))
-    assert found.density == pytest.approx(summary.params.bands[summary.band].density)
-    assert found.odd == "pull 3 of `0.3.mcap`"
-    assert found.at_sides == [
+    result = findings(replace(summary, trials=rows, theta=theta))
+    assert (result.outside, result.left, result.force) == (1, 0.07, 0.3)
+    assert (result.observed, result.surprising) == (1, 1)
+    assert result.bias == pytest.approx(np.mean([1.5 / 1.92, 2.1 / 2.08]) - 1)
+    assert result.bias_of_half == pytest.approx(np.mean([-4.2, 0.2]))
+    assert result.density == pytest.approx(summary.params.bands[summary.band].density)
+    assert result.odd == "pull 3 of `0.3.mcap`"
+    assert result.at_sides == [
         ("stress relaxation per decade of time", "upper side of its box, 0 to 20 %")
     ]

@@ -51,10 +51,10 @@ def test_a_program_reads_the_same(folder) -> None:
     assert card["band"] == BAND and card["method"] == METHOD
     assert card["verdict"] in ("can be trusted", "with care", "no") and card["reasons"]
     assert [draw["target_m"] for draw in card["draws"]] == [1.725, 1.925, 2.125]
-    young = next(one for one in card["values"] if one["name"] == "youngs_modulus")
+    young = next(row for row in card["values"] if row["name"] == "youngs_modulus")
     assert young["value"] == pytest.approx(THETA["youngs_modulus"] / 1000)
     assert (young["low"], young["high"]) == pytest.approx((285, 315)) and young["unit"] == "kPa"
-    fixed = {one["name"] for one in card["values"] if one["fixed"]}
+    fixed = {row["name"] for row in card["values"] if row["fixed"]}
     assert fixed == {"poissons_ratio", "dynamic_friction", "damping_scale"}
     assert (card["recordings"], card["pulls"], card["launches"]) == (1, 1, 0)
     assert all(sentence.endswith(".") for sentence in card["reasons"] + card["next"])
@@ -95,7 +95,7 @@ def test_without_a_density_it_tells_less(copied) -> None:
     card = write(load(copied / "params.yaml"), BAND, METHOD, copied)
     assert card["verdict"] != "can be trusted"
     assert any("does not tell how sure" in reason for reason in card["reasons"])
-    assert all(one["low"] is None for one in card["values"])
+    assert all(row["low"] is None for row in card["values"])
 
 
 def test_a_missing_input_leaves_nothing_half_written(copied) -> None:

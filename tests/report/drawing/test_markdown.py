@@ -17,7 +17,7 @@ def test_a_name_is_shown_letter_by_letter(name: str, tmp_path: Path) -> None:
     table = f"| a | b |\n| --- | --- |\n| {cell(as_code(name))} | 1 |\n"
     html = page(f"# Card\n\n## Values\n\n- {as_code(name)}\n\n{table}", tmp_path, "A title")
     body = html[html.index("<main>") :]
-    shown = [unescape(one) for one in re.findall("<code>(.*?)</code>", body, re.DOTALL)]
+    shown = [unescape(text) for text in re.findall("<code>(.*?)</code>", body, re.DOTALL)]
     assert shown == [printable(name)] * 2
     assert set(re.findall("<([a-z0-9]+)", body)) <= {
         *("main", "h1", "h2", "ul", "li", "code"),

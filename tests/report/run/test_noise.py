@@ -16,8 +16,8 @@ from tests.report.run.tables.toy_results import launches
 ONE = [1.925]
 
 
-def interval(one) -> tuple[float, float]:
-    return one.low, one.high
+def interval(result) -> tuple[float, float]:
+    return result.low, result.high
 
 
 @pytest.mark.parametrize("kind", ["virtual", "measured"])
@@ -26,8 +26,8 @@ def test_many_launches_give_scipys_interval(kind: str) -> None:
     rng = np.random.default_rng(3)
     shared = rng.normal(0, 0.02, 200)
     first, second = 0.10 + shared, 0.12 + shared + rng.normal(0, 0.005, 200)
-    found = difference(launches([first], kind, ONE), launches([second], kind, ONE), seed=1)
-    assert found.mean == pytest.approx((second - first).mean())
+    result = difference(launches([first], kind, ONE), launches([second], kind, ONE), seed=1)
+    assert result.mean == pytest.approx((second - first).mean())
     paired = kind == "virtual"
     test = stats.ttest_rel(second, first) if paired else stats.ttest_ind(second, first)
     again = stats.bootstrap(
@@ -38,10 +38,10 @@ def test_many_launches_give_scipys_interval(kind: str) -> None:
         method="percentile",
         rng=np.random.default_rng(0),
     )
-    width = found.high - found.low
+    width = result.high - result.low
     for other in (test.confidence_interval(0.95), again.confidence_interval):
-        assert interval(found) == pytest.approx((other.low, other.high), abs=0.04 * width)
-    assert found.real == (test.pvalue < 0.05)
+        assert interval(result) == pytest.approx((other.low, other.high), abs=0.04 * width)
+    assert result.real == (test.pvalue < 0.05)
 
 
 def test_pairs_see_what_their_errors_hide() -> None:
@@ -59,8 +59,10 @@ def test_three_pairs_by_enumeration() -> None:
     """Two draws of three with replacement: nine equally likely means."""
     change = np.array([0.01, 0.02, 0.06])
     means = [np.mean(pair) for pair in itertools.product(change, repeat=2)]
-    found = difference(launches([[0.1] * 3], targets=ONE), launches([0.1 + change], targets=ONE), 1)
-    assert interval(found) == pytest.approx((min(means), max(means)))
+    result = difference(
+        launches([[0.1] * 3], targets=ONE), launches([0.1 + change], targets=ONE), 1
+    )
+    assert interval(result) == pytest.approx((min(means), max(means)))
     # their variance is that of the mean of three, unbiased
     assert np.var(means) == pytest.approx(np.var(change, ddof=1) / 3)
 
@@ -68,31 +70,31 @@ def test_three_pairs_by_enumeration() -> None:
 def test_a_target_counts_as_much_as_another_and_keeps_its_own_launches() -> None:
     """Differences between targets are no noise: 10 cm here and 30 cm there give no width."""
     zero, far = launches([[0.0] * 5] * 2, targets=[1.7, 1.9]), [[0.1] * 5, [0.3] * 5]
-    found = difference(zero, launches(far, targets=[1.7, 1.9]), 1)
-    assert found.mean == pytest.approx(0.2) and interval(found) == pytest.approx((0.2, 0.2))
+    result = difference(zero, launches(far, targets=[1.7, 1.9]), 1)
+    assert result.mean == pytest.approx(0.2) and interval(result) == pytest.approx((0.2, 0.2))
 
 
 def test_failures_are_left_out_with_their_pairs() -> None:
     first, second = launches([[0.0] * 5] * 3), launches([[0.1, 0.1, 0.1, 0.1, 0.9]] * 3)
-    found = difference(first, second, 1)  # the last of each target leaves the area or not
+    result = difference(first, second, 1)  # the last of each target leaves the area or not
     inside = second.landing_y <= 2.425
-    assert found.launches == (int(inside.sum()),) * 2
-    assert found.left_out == 2 * int((~inside).sum())
-    assert found.failed == (0.0, pytest.approx((~inside).mean()))
+    assert result.launches == (int(inside.sum()),) * 2
+    assert result.left_out == 2 * int((~inside).sum())
+    assert result.failed == (0.0, pytest.approx((~inside).mean()))
     assert difference(first, launches([[0.1] * 5] * 3, failed=15), 1) is None
     assert difference(first.iloc[:0], first, 1) is None
 
 
 def test_a_single_launch_has_no_interval() -> None:
-    found = difference(launches([[0.0]] * 3), launches([[0.1]] * 3), 1)
-    assert found.mean == pytest.approx(0.1) and math.isnan(found.low) and not found.real
+    result = difference(launches([[0.0]] * 3), launches([[0.1]] * 3), 1)
+    assert result.mean == pytest.approx(0.1) and math.isnan(result.low) and not result.real
 
 
 def test_measured_launches_are_compared_where_both_aimed() -> None:
     first = launches([[0.1, 0.1], [0.5, 0.5]], "measured", targets=[1.7, 1.9])
     second = launches([[0.2, 0.2, 0.2]], "measured", targets=[1.7])
-    found = difference(first, second, 1)
-    assert found.mean == pytest.approx(0.1) and found.launches == (2, 3) and found.left_out == 2
+    result = difference(first, second, 1)
+    assert result.mean == pytest.approx(0.1) and result.launches == (2, 3) and result.left_out == 2
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-0.05, 0.05))
@@ -113,8 +115,8 @@ def test_how_often_the_interval_holds_the_truth(monkeypatch) -> None:
     zero = launches(np.full((3, 5), 0.2))
     held = 0
     for _ in range(300):
-        found = difference(zero, launches(0.2 + rng.normal(0.01, 0.02, (3, 5))), 1)
-        held += found.low <= 0.01 <= found.high
+        result = difference(zero, launches(0.2 + rng.normal(0.01, 0.02, (3, 5))), 1)
+        held += result.low <= 0.01 <= result.high
     assert 0.912 <= held / 300 <= 0.988
 
 

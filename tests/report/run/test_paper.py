@@ -48,7 +48,7 @@ def numbers(cell: str) -> tuple[float, ...] | None:
     """Mean and deviation, or one number; None of N/A."""
     if "N/A" in cell:
         return None
-    return tuple(float(one) for one in re.findall(r"\d+\.\d+(?:E[+-]\d+)?", cell))
+    return tuple(float(number) for number in re.findall(r"\d+\.\d+(?:E[+-]\d+)?", cell))
 
 
 def test_landing_errors_are_those_of_the_paper() -> None:

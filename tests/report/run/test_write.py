@@ -83,8 +83,8 @@ def rig(root, params, bands: tuple[str, ...]):
     run = params.run.model_copy(
         update={"bands": bands, "rig": bands, "methods": METHODS[:4], "ablations": more}
     )
-    about = params.bands[BAND].model_copy(update=yaml)
-    return params.model_copy(update={"run": run, "bands": dict.fromkeys(bands, about)})
+    band_params = params.bands[BAND].model_copy(update=yaml)
+    return params.model_copy(update={"run": run, "bands": dict.fromkeys(bands, band_params)})
 
 
 METHODS = (
@@ -109,10 +109,10 @@ def test_the_report_is_complete_and_equal_in_another_process(root, params) -> No
     assert tables == {file.name for file in first if file.parent.name == "tables"}
     assert "3.00 ± 0.71" in text  # |miss| 2 and 3 cm, then 4 cm; one target has a deviation
     assert "1 of 4" in text
-    found = json.loads((root / "reports" / "summary.json").read_text())
-    assert found[f"{BAND}_cm"] == 3.0 and found["failed"] == 1
-    about = json.loads((root / "reports" / "run.js").read_text().removeprefix("run = "))
-    assert {"written", "commit", "machine", "python", "numpy"} <= {*about}
+    summary = json.loads((root / "reports" / "summary.json").read_text())
+    assert summary[f"{BAND}_cm"] == 3.0 and summary["failed"] == 1
+    provenance = json.loads((root / "reports" / "run.js").read_text().removeprefix("run = "))
+    assert {"written", "commit", "machine", "python", "numpy"} <= {*provenance}
     shutil.rmtree(root / "reports")
     other = os.environ | {"PYTHONHASHSEED": "7", "TZ": "Asia/Seoul", "OMP_NUM_THREADS": "1"}
     code = ELSEWHERE.format(root=str(root))

@@ -32,7 +32,7 @@ def landing_map(request) -> LandingMap:
 
 def best_of_the_box(target: float, max_force: float) -> float:
     """Least steepness among exact hits on ten thousand lines through the fork."""
-    found = []
+    candidates = []
     for slope in np.linspace(toy.DRAW_Z[1] / toy.DRAW_Y[0], toy.DRAW_Z[0] / toy.DRAW_Y[1], 2000):
         reach = [
             max(toy.DRAW_Y[0], toy.DRAW_Z[0] / slope),
@@ -44,8 +44,8 @@ def best_of_the_box(target: float, max_force: float) -> float:
         y = brentq(lambda y, slope=slope: land(np.array([y, slope * y])) - target, *reach)
         draw = np.array([y, slope * y])
         if toy.launch(draw[None]).hold_force[0] <= max_force:
-            found.append(steepness(draw))
-    return min(found)
+            candidates.append(steepness(draw))
+    return min(candidates)
 
 
 @pytest.mark.parametrize("target", TARGETS)

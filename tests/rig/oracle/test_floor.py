@@ -19,9 +19,9 @@ def test_numbers_begin_with_the_trials_own(params) -> None:
     """Those of stages/trials.py: launches are numbered target by target."""
     repeats, count = params.trials.repeats, len(params.trials.targets)
     numbers = trial_numbers(params)
-    own = np.arange(count * repeats)
+    expected = np.arange(count * repeats)
     assert numbers.shape == (count, repeats + params.floor.launches)
-    assert np.array_equal(numbers[:, :repeats].ravel(), own)
+    assert np.array_equal(numbers[:, :repeats].ravel(), expected)
     assert len(np.unique(numbers)) == numbers.size
 
 
@@ -43,7 +43,7 @@ def test_a_floor_counts_what_failed_and_averages_the_rest(params) -> None:
     assert np.isclose(floor["mean_error_m"], np.nanmean(np.abs(misses)))
     none = errors_of(draws * np.nan, np.full(misses.shape, np.nan), params)
     assert none["mean_error_m"] is None and none["failed"] == none["launches"]
-    assert [one["draw"] for one in none["targets"].values()] == [None] * len(targets)
+    assert [row["draw"] for row in none["targets"].values()] == [None] * len(targets)
 
 
 def test_a_floor_is_read_or_refused_by_its_name(tmp_path, params) -> None:

@@ -12,8 +12,8 @@ from rig.physics.world import string_of
 def test_a_strand_hangs_further_the_more_it_carries_and_relaxes(params) -> None:
     string = string_of(params, "band1")
 
-    def stretch(strands: int, one=string) -> float:
-        return hanging_stretch(one, tension(strands)) or np.nan
+    def stretch(strands: int, string_i=string) -> float:
+        return hanging_stretch(string_i, tension(strands)) or np.nan
 
     folded, single = map(stretch, READINGS)
     assert 1 < folded < single

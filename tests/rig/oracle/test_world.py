@@ -35,8 +35,8 @@ def test_launches_are_those_of_the_rig(written) -> None:
     draws, numbers = np.array([DRAW, [-0.40, -0.25]]), np.array([[7, 8], [9, 10]])
     with World("band1", path, workers=1) as world:
         landing, exact = world.landings(draws, numbers), world.exact(draws)
-    one = [launch("band1", load(path), DRAW, int(number)).landing_y for number in numbers[0]]
-    assert landing[0].tolist() == one and np.isnan(landing[1]).all()
+    landings = [launch("band1", load(path), DRAW, int(number)).landing_y for number in numbers[0]]
+    assert landing[0].tolist() == landings and np.isnan(landing[1]).all()
     assert exact.landing_y[0] == launch("band1", load(path), DRAW, None).landing_y
     assert exact.failure[0] is None and "more than 11 N" in exact.failure[1]
     assert np.isnan(exact.landing_y[1]) and exact.hold_force[1] > 11.0

@@ -98,7 +98,7 @@ def test_the_arm_gives_way(coarse: Params) -> None:
     force = launch_from(string, soft, aim).hold_force
     there = aim - aim / np.linalg.norm(aim) * force / stiffness
     near, nearer, far = (
-        launch_from(string, *one).landing_y for one in ((soft, aim), (firm, there), (firm, aim))
+        launch_from(string, *case).landing_y for case in ((soft, aim), (firm, there), (firm, aim))
     )
     assert np.isclose(near, nearer, rtol=2e-3) and near < 0.97 * far
 
@@ -116,7 +116,7 @@ def test_every_memory_reaches_the_launch(coarse: Params, name: str) -> None:
     band = coarse.rig.bands["band1"].model_copy(update={"relaxation": (), name: MEMORIES[name]})
     world = with_(coarse, "rig", bands={"band1": band})
     late = with_(world, "launch", pause=20.0)
-    now, then = (launch("band1", one, DRAW, None) for one in (world, late))
+    now, then = (launch("band1", params_i, DRAW, None) for params_i in (world, late))
     if name != "softening":
         assert then.hold_force < 0.999 * now.hold_force and then.speed < now.speed
         return
@@ -127,7 +127,7 @@ def test_every_memory_reaches_the_launch(coarse: Params, name: str) -> None:
     softer = thin.rubber.response(stretch, memory)[0][-1] / elastic[-1]
     light = replace(thin, mass=1e-4)  # bends and weighs next to nothing
     virgin = replace(light, rubber=replace(light.rubber, softening=None))
-    held = [launch_from(one, coarse, aim).hold_force for one in (light, virgin)]
+    held = [launch_from(string, coarse, aim).hold_force for string in (light, virgin)]
     assert softer < 0.9 and np.isclose(held[0] / held[1], softer, rtol=5e-3)
 
 

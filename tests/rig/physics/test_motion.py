@@ -51,8 +51,8 @@ def test_all_that_follows_is_later_by_the_dips() -> None:
     np.testing.assert_allclose(plain.position(after), dipped.position(after + late), atol=1e-12)
     for state in ("grip", "finger"):
         opening = np.linspace(OPEN - 0.01, OPEN + 0.2, 50)
-        found = getattr(dipped, state)(opening + late)
-        np.testing.assert_allclose(found, getattr(plain, state)(opening), atol=1e-9)
+        values = getattr(dipped, state)(opening + late)
+        np.testing.assert_allclose(values, getattr(plain, state)(opening), atol=1e-9)
 
 
 def test_dips_at_one_place_come_as_they_are_given() -> None:
@@ -88,9 +88,9 @@ def test_the_band_follows_a_dip_and_pulls_less_there(coarse: Params) -> None:
 def test_a_band_like_another_has_its_rubber_and_launches_but_other_draws(coarse: Params) -> None:
     """What a recording draws is its own, what launches draw is the rubber's."""
     drawing = with_(coarse, "rig", draws={"pads.force": (30, 44), "projectile_drag": (0, 1e-3)})
-    one, other = (string_of(drawing, name).rubber for name in ("band1", "band1_dip"))
-    assert (one.scale, one.law, one.viscosity) == (other.scale, other.law, other.viscosity)
-    assert (one.relaxation == other.relaxation).all()
+    rubber, other = (string_of(drawing, name).rubber for name in ("band1", "band1_dip"))
+    assert (rubber.scale, rubber.law, rubber.viscosity) == (other.scale, other.law, other.viscosity)
+    assert (rubber.relaxation == other.relaxation).all()
     landed = [launch(name, drawing, DRAW, 3) for name in ("band1", "band1_dip")]
     assert landed[0] == landed[1] and np.isfinite(landed[0].landing_y)
     forces = [drawn(drawing, name).rig.pads.force for name in ("band1", "band1_dip")]

@@ -114,11 +114,11 @@ def bergstrom_boyce(rate: float, end: float, flow: Flow) -> float:
 @pytest.mark.parametrize("rate", [1e-3, 0.1, 10.0])
 def test_flow_at_a_constant_strain_rate_is_another_solvers(rate: float) -> None:
     times = np.linspace(0, np.log(1.8) / rate, 50)
-    found, path = followed(FLOWING, lambda time: np.exp(rate * time), times)
-    over = found - stress(np.exp(rate * times))
+    stresses, path = followed(FLOWING, lambda time: np.exp(rate * time), times)
+    over = stresses - stress(np.exp(rate * times))
     assert np.isclose(over[-1], bergstrom_boyce(rate, 1.8, FLOW), rtol=1e-5)
-    known = FLOWING.history(np.exp(rate * times), times[1])[1][:, 0]
-    np.testing.assert_allclose(known, path[:, 0], rtol=2e-4, atol=1e-5)
+    memory = FLOWING.history(np.exp(rate * times), times[1])[1][:, 0]
+    np.testing.assert_allclose(memory, path[:, 0], rtol=2e-4, atol=1e-5)
 
 
 @pytest.mark.parametrize("power", [2.0, 4.0])
@@ -129,8 +129,8 @@ def test_the_steady_overstress_is_a_power_of_the_rate(power: float) -> None:
     steady = []
     for rate in (1e-3, 1e-2):
         times = np.linspace(0, np.log(2.5) / rate, 30)
-        found = followed(rubber, lambda time, rate=rate: np.exp(rate * time), times)[0]
-        steady.append((found[-1] - stress(2.5)) * 2.5 / flow.share / TRELOAR.modulus)
+        stresses = followed(rubber, lambda time, rate=rate: np.exp(rate * time), times)[0]
+        steady.append((stresses[-1] - stress(2.5)) * 2.5 / flow.share / TRELOAR.modulus)
     assert np.isclose(steady[0], (1e-3 / flow.rate) ** (1 / power), rtol=1e-3)
     assert np.isclose(steady[1] / steady[0], 10 ** (1 / power), rtol=1e-3)
 
@@ -142,8 +142,8 @@ def test_a_second_loading_follows_the_first_unloading() -> None:
     further = np.linspace(1.0, 1.9, 91)
     path = np.concatenate([there, back[1:], further[1:]])
     times = np.linspace(0, 10, len(path))
-    found = followed(slow, lambda time: np.interp(time, times, path), times)[0]
-    first, unloading, second = found[:61], found[60:121], found[120:]
+    stresses = followed(slow, lambda time: np.interp(time, times, path), times)[0]
+    first, unloading, second = stresses[:61], stresses[60:121], stresses[120:]
     np.testing.assert_allclose(first, stress(there), rtol=1e-3, atol=1e-6)
     np.testing.assert_allclose(second[:60], unloading[::-1][:60], rtol=1e-3, atol=1e-6)
     np.testing.assert_allclose(second[62:], stress(further[62:]), rtol=1e-3)
@@ -160,13 +160,13 @@ def test_the_history_softens_as_the_rates_do() -> None:
     path = 1.3 - 0.3 * np.cos(2 * np.pi * times / 4)
     both = replace(SOFT, relaxation=np.array([[0.2, 0.1]]), flow=FLOW)
     _, expected = followed(both, lambda time: 1.3 - 0.3 * np.cos(2 * np.pi * time / 4), times)
-    relaxed, found = both.history(path, times[1])
-    np.testing.assert_allclose(found, expected, rtol=2e-3, atol=2e-4)
+    relaxed, memory = both.history(path, times[1])
+    np.testing.assert_allclose(memory, expected, rtol=2e-3, atol=2e-4)
     np.testing.assert_allclose(relaxed[-100:, 2], TRELOAR.energy(path[-100:]))
-    ratios = found[300] / relaxed[300]
-    np.testing.assert_allclose(both.remembering(path[300:301], ratios)[0], found[300])
+    ratios = memory[300] / relaxed[300]
+    np.testing.assert_allclose(both.remembering(path[300:301], ratios)[0], memory[300])
     worn = both.history(path, times[1], worst=1.9)[1]
-    assert (worn[:, 2] == TRELOAR.energy(1.9)).all() and (worn[100:, 0] < found[100:, 0]).all()
+    assert (worn[:, 2] == TRELOAR.energy(1.9)).all() and (worn[100:, 0] < memory[100:, 0]).all()
 
 
 KINDS = {
@@ -183,9 +183,9 @@ def test_a_closed_cycle_costs_work(kind: str) -> None:
     """From rest to rest, also through compression; again where not only virgin rubber loses."""
     times = np.linspace(0, 12, 6001)
     path = lambda time: 1 + 0.8 * np.sin(np.pi * time / 3) ** 3 * (time < 9)  # noqa: E731
-    found = followed(KINDS[kind], lambda time: np.maximum(path(time), 0.7), times)[0]
+    stresses = followed(KINDS[kind], lambda time: np.maximum(path(time), 0.7), times)[0]
     stretch = np.maximum(path(times), 0.7)
-    work = cumulative_trapezoid(found, stretch, initial=0)
+    work = cumulative_trapezoid(stresses, stretch, initial=0)
     first, again = np.diff(work[[0, 3000, 6000]])
     assert first > 1e-2
     assert abs(again) < 1e-9 if kind.startswith("softening") else again > 1e-2
@@ -197,8 +197,8 @@ def test_work_is_what_is_stored_and_what_is_lost(kind: str) -> None:
     rubber = KINDS[kind]
     times = np.linspace(0, 4, 20001)
     stretch = 1.4 - 0.4 * np.cos(np.pi * times)
-    found, memory = followed(rubber, lambda time: 1.4 - 0.4 * np.cos(np.pi * time), times)
-    work = cumulative_trapezoid(found, stretch, initial=0)
+    stresses, memory = followed(rubber, lambda time: 1.4 - 0.4 * np.cos(np.pi * time), times)
+    work = cumulative_trapezoid(stresses, stretch, initial=0)
     stored = rubber.stored(stretch, memory)
     lost = work - (stored - stored[0])
     assert (np.diff(lost) > -1e-6).all() and lost[-1] > 0.01
@@ -216,7 +216,7 @@ def test_a_law_whose_energy_at_rest_is_rounded_below_zero_softens_by_strain() ->
     stretch = np.append(1.0, np.nextafter(1.0, 2.0) + np.linspace(-1e-8, 1e-8, 101))
     assert law.energy(stretch).min() < 0  # else this test would show nothing
     memory = law.energy(stretch)[:, None]
-    assert all(np.isfinite(one).all() for one in rubber.response(stretch, memory))
+    assert all(np.isfinite(array).all() for array in rubber.response(stretch, memory))
     assert np.isfinite(rubber.stored(stretch, memory)).all()
 
 

@@ -55,10 +55,10 @@ def test_band1_stiffens_as_the_silicone_nearest_to_it(params: Params, shared: Pa
         return (law.stress(taut)[0] - stress) / stress.max()
 
     limits = [1e-4, 1.0, 0.0], [1.0, 10.0, 0.03]
-    found = least_squares(misfit, [0.03, 3.0, 0.01], bounds=limits)
+    fit = least_squares(misfit, [0.03, 3.0, 0.01], bounds=limits)
     ours = params.rig.bands["band1"].constants
-    np.testing.assert_allclose(ours, found.x[:2], rtol=3e-3)
-    assert np.sqrt(np.mean(found.fun**2)) < 0.004
+    np.testing.assert_allclose(ours, fit.x[:2], rtol=3e-3)
+    assert np.sqrt(np.mean(fit.fun**2)) < 0.004
 
     slope = law_of("ogden", ours).stress(np.linspace(1, 2.2, 121))[1]
     assert 20 < slope.argmin() < 40 and slope[-1] > 1.4 * slope.min()  # at 1.3, and then up
@@ -145,5 +145,5 @@ def test_a_minutes_rest_forgets_all_but_the_softening(params: Params, band: str)
     _, stretch, _, memory = pulled(string, np.array([0.0, -0.30, -0.15]), again=True)
     path = np.concatenate([recorded, np.ones(round(rest / step)), stretch])
     true = string.rubber.history(path, step)[1][-1:]
-    forces = [string.rubber.response(stretch[-1:], one)[0][0] for one in (true, memory[-1:])]
+    forces = [string.rubber.response(stretch[-1:], state)[0][0] for state in (true, memory[-1:])]
     assert forces[0] == pytest.approx(forces[1], rel=2.5e-3)

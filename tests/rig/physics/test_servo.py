@@ -22,20 +22,20 @@ def test_it_swings_back_like_an_oscillator(motion: HandMotion) -> None:
     start, offset = 9.4, np.array([1e-3, 2e-3, -1e-3])
     times = np.linspace(start, motion.end, 50)
     place = motion.position(start)
-    found = follow.alone(np.concatenate([place + offset, np.zeros(3)]), times, 1e-9)
+    states = follow.alone(np.concatenate([place + offset, np.zeros(3)]), times, 1e-9)
     decay = DAMPING / (2 * MASS)
     rate = np.sqrt(STIFFNESS / MASS - decay**2)
     t = (times - start)[:, None]
     shape = np.exp(-decay * t) * (np.cos(rate * t) + decay / rate * np.sin(rate * t))
-    np.testing.assert_allclose(found[:, :3] - place, shape * offset, atol=1e-8)
+    np.testing.assert_allclose(states[:, :3] - place, shape * offset, atol=1e-8)
 
 
 def test_without_a_load_it_stays_on_a_path_that_moves(motion: HandMotion) -> None:
     follow, times = Servo(MASS, STIFFNESS, DAMPING, motion.path), np.linspace(2.5, 5.5, 40)
     start = np.concatenate([motion.position(2.5), motion.position(2.5, 1)])
-    found = follow.alone(start, times, 1e-9)
-    np.testing.assert_allclose(found[:, :3], motion.position(times), atol=1e-7)
-    np.testing.assert_allclose(found[:, 3:], motion.position(times, 1), atol=1e-6)
+    states = follow.alone(start, times, 1e-9)
+    np.testing.assert_allclose(states[:, :3], motion.position(times), atol=1e-7)
+    np.testing.assert_allclose(states[:, 3:], motion.position(times, 1), atol=1e-6)
 
 
 def test_a_steady_load_pushes_it_aside_by_its_stiffness(motion: HandMotion) -> None:
@@ -52,8 +52,8 @@ def test_the_path_moves_as_it_says() -> None:
     times = np.linspace(0.06, 9.94, 67)
     for order in (0, 1):
         ahead, behind = (motion.position(times + step, order) for step in (nudge, -nudge))
-        found = (ahead - behind) / (2 * nudge)
-        np.testing.assert_allclose(found, motion.position(times, order + 1), atol=1e-6)
+        difference = (ahead - behind) / (2 * nudge)
+        np.testing.assert_allclose(difference, motion.position(times, order + 1), atol=1e-6)
 
 
 def test_damping_ratio(params: Params, motion: HandMotion) -> None:

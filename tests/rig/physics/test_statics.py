@@ -16,10 +16,10 @@ def test_a_held_band_rests_where_damped_motion_brings_it(coarse, monkeypatch, le
     string = string_of(coarse, "band1")
     at = bent_at(string, length * DRAW / np.linalg.norm(DRAW))
     memory = np.array([0.9, 0.9, 0.9])
-    found = string.at_rest(at, 1e-6, held=True, memory=memory)
+    state = string.at_rest(at, 1e-6, held=True, memory=memory)
     monkeypatch.setattr(dynamics, "balanced", lambda *arguments: None)
     settled = string.at_rest(at, 1e-8, held=True, memory=memory)
-    assert np.allclose(found, settled, atol=1e-6)
+    assert np.allclose(state, settled, atol=1e-6)
 
 
 def test_nothing_moves_it_any_more(params: Params) -> None:

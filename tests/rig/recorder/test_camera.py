@@ -67,9 +67,9 @@ def test_a_fast_band_is_smeared_and_loses_depth(camera: VirtualCamera, params: P
         for way in ways
     ]
     fast, still = blurred(seen), seen[4]
-    sharp, wide = (np.count_nonzero(one.color[..., 0] > 0) for one in (still, fast))
+    sharp, wide = (np.count_nonzero(view.color[..., 0] > 0) for view in (still, fast))
     assert 3 < wide / sharp < 5
-    assert np.isclose(fast.color.sum(), np.mean([one.color.sum() for one in seen]), rtol=1e-5)
+    assert np.isclose(fast.color.sum(), np.mean([view.color.sum() for view in seen]), rtol=1e-5)
     assert (fast.depth < 1.9).sum() < 0.1 * (still.depth < 1.9).sum()
     rng = np.random.default_rng(0)
     depth = measured_depth(fast, params.rig.camera, rng)

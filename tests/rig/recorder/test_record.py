@@ -144,8 +144,8 @@ def test_force_peaks_as_the_papers_and_the_same_seed_gives_the_same_bytes(
         record(quick, band, tmp_path / name, picture_scale=0.1)
         stated[peak] = stated.get(peak) or read(tmp_path / name, *FELT)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
-    for peak, one in stated.items():
-        smooth = np.convolve(response(one)[:, 1], np.ones(50) / 50, "same")
+    for peak, received in stated.items():
+        smooth = np.convolve(response(received)[:, 1], np.ones(50) / 50, "same")
         assert np.isclose(smooth.max(), peak, rtol=0.01)
         assert 5.5 < np.argmax(smooth) / 1000 < 6.5
         assert np.abs(smooth[9500:9900]).max() < 0.1  # the hand is at rest again

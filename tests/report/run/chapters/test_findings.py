@@ -17,13 +17,15 @@ MAIN, THEIRS = "least_squares", "sling2sim2real"
 
 
 def run(*some, floors=None, unused=None) -> SimpleNamespace:
-    references = tuple(m for m in (MAIN, THEIRS) if any(one.method == m for one in some))
-    found = results(*some, floors=floors)
-    found.unused.update(unused or {})
-    named = styles(dict.fromkeys(one.method for one in some))
+    references = tuple(
+        m for m in (MAIN, THEIRS) if any(method_result.method == m for method_result in some)
+    )
+    outcome = results(*some, floors=floors)
+    outcome.unused.update(unused or {})
+    named = styles(dict.fromkeys(method_result.method for method_result in some))
     params = SimpleNamespace(trials=load(DEFAULTS).trials)
     return SimpleNamespace(
-        results=found,
+        results=outcome,
         styles=named,
         params=params,
         main=references[0],
@@ -124,9 +126,11 @@ def test_nothing_is_said_of_nothing() -> None:
 def test_what_went_wrong_is_said() -> None:
     card = {"training": {"converged": False, "mean_error_m": 0.05}}
     trials = launches([[0.0] * 2] * 3).assign(predicted_y=math.nan)
-    about = confidence() | {"steps": 14, "settled": False}
-    about["recordings"][0]["pictures"] = []
-    lines = doubts(run(result("mine", MAIN, trials, card=card, confidence=about), unused={"x": 3}))
+    posterior = confidence() | {"steps": 14, "settled": False}
+    posterior["recordings"][0]["pictures"] = []
+    lines = doubts(
+        run(result("mine", MAIN, trials, card=card, confidence=posterior), unused={"x": 3})
+    )
     assert len(lines) == 5 and all(line.startswith("⚠ ") for line in lines)
     unpredicted, policy, fit, recoil, unused = lines
     assert unpredicted == "⚠ mine, ours: 6 of 6 launches could not be predicted."

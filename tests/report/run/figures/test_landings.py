@@ -19,14 +19,14 @@ def trials() -> pd.DataFrame:
 
 def dots(ax) -> dict[int, list[float]]:
     """Places on the axis by row."""
-    found = {}
+    places = {}
     for collection in ax.collections:
         for x, y in (
             np.ma.getdata(collection.get_offsets()) if len(collection.get_offsets()) else ()
         ):
             if collection.get_paths() and hasattr(collection, "get_sizes"):
-                found.setdefault(round(y), []).append(x)
-    return found
+                places.setdefault(round(y), []).append(x)
+    return places
 
 
 def words(figure) -> list[str]:
@@ -36,9 +36,9 @@ def words(figure) -> list[str]:
 def test_every_launch_lies_as_far_off_as_it_landed(retained) -> None:
     landings.misses("", trials(), {BAND: 0.02}, styles(METHODS))
     first, second = retained[0].axes
-    found = dots(first)
-    assert sorted(found) == [0, 1]
-    for row in found.values():
+    places = dots(first)
+    assert sorted(places) == [0, 1]
+    for row in places.values():
         np.testing.assert_allclose(sorted(row), [-3, 2, 4])
     assert dots(second) == {} and [t.get_text() for t in second.texts] == ["4 of 4 failed"]
     assert [t.get_text() for t in first.texts] == ["1 of 4 failed"] * 2

@@ -18,18 +18,18 @@ FAR = launches([[0.1, 0.1], [0.2, 0.2], [0.3, 0.3]])
 
 
 def lines(rows, targets=TARGETS) -> dict[tuple[str, str, str], list[str]]:
-    _, found = as_table(rows, targets, NAMED)
-    return {tuple(line[:3]): line[3:] for line in found}
+    _, cells = as_table(rows, targets, NAMED)
+    return {tuple(line[:3]): line[3:] for line in cells}
 
 
 def test_cells_by_hand() -> None:
     """|miss| 1 and 3, 2 and 2, 4 and 4 cm: deviations 1.41, 0 and 0 within targets."""
     rows = benchmark(ran({"band1 sling2sim2real": CLOSE}))
-    found = lines(rows)["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
+    cells = lines(rows)["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
     pooled = math.sqrt(2 / 3)
     over_all = np.std([1, 3, 2, 2, 4, 4], ddof=1)
-    assert found[:3] == ["2.00 ± 1.41", "2.00 ± 0.00", "4.00 ± 0.00"]
-    assert found[3:] == [f"2.67 ± {pooled:.2f}", f"{over_all:.2f}", "0 of 6"]
+    assert cells[:3] == ["2.00 ± 1.41", "2.00 ± 0.00", "4.00 ± 0.00"]
+    assert cells[3:] == [f"2.67 ± {pooled:.2f}", f"{over_all:.2f}", "0 of 6"]
 
 
 def test_the_papers_rows_stand_below_those_that_ran_in_its_order() -> None:
@@ -45,8 +45,8 @@ def test_the_papers_rows_stand_below_those_that_ran_in_its_order() -> None:
     theirs = lines(rows)["Band 2 (medium)", "Package SI", "paper, real robot"]
     assert theirs[:4] == ["60.00 ± 2.74", "34.50 ± 3.32", "**11.00 ± 6.44**", "35.17 ± 4.58"]
     assert theirs[4:] == ["–", "–"]
-    one = lines(benchmark(ran({"band3 package_si": CLOSE})))
-    assert one["Band 3 (stiff)", "Package SI", "paper, real robot"][:4] == ["N/A"] * 4
+    table = lines(benchmark(ran({"band3 package_si": CLOSE})))
+    assert table["Band 3 (stiff)", "Package SI", "paper, real robot"][:4] == ["N/A"] * 4
 
 
 def test_partial_failures_are_counted_and_total_ones_are_not_available() -> None:
@@ -55,24 +55,24 @@ def test_partial_failures_are_counted_and_total_ones_are_not_available() -> None
         "band1 package_si": launches([[0.1] * 5] * 3, failed=15),
         "band1 real2sim2real": launches([[0.9] * 5] * 3),  # never within the target area
     }
-    found = lines(benchmark(ran(trials)))
-    ours = found["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
+    table = lines(benchmark(ran(trials)))
+    ours = table["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
     assert ours[2:4] == ["10.00 ± 0.00, 2 failed"] * 2 and ours[4:] == ["0.00", "2 of 15"]
     for method in ("Package SI", "Real2Sim2Real"):
-        assert found["Band 1 (soft)", method, "virtual"] == [*["N/A"] * 4, "–", "15 of 15"]
+        assert table["Band 1 (soft)", method, "virtual"] == [*["N/A"] * 4, "–", "15 of 15"]
     assert spread(LandingErrors(1, 0, 0.05, math.nan, math.nan)) == "5.00"
 
 
 def test_bold_is_the_lowest_of_equals_that_all_landed() -> None:
     some = launches([[0.0, 0.0]] * 3, failed=1)
     trials = {"band1 sling2sim2real": CLOSE, "band1 package_si": FAR, "band1 mine": some}
-    found = lines(benchmark(ran(trials, {"band1": floor((0.001,) * 3, (0.001,) * 3)})))
-    ours = found["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
+    table = lines(benchmark(ran(trials, {"band1": floor((0.001,) * 3, (0.001,) * 3)})))
+    ours = table["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
     assert all(cell.startswith("**") == (i in (2, 3)) for i, cell in enumerate(ours))
-    assert found["Band 1 (soft)", "mine", "virtual"][0] == "**0.00 ± 0.00**"
-    assert found["Band 1 (soft)", "mine", "virtual"][2] == "0.00, 1 failed"
-    assert not any("**" in cell for cell in found["Band 1 (soft)", "Package SI", "virtual"])
-    assert not any("**" in c for c in found["Band 1 (soft)", "actuation floor", "virtual, oracle"])
+    assert table["Band 1 (soft)", "mine", "virtual"][0] == "**0.00 ± 0.00**"
+    assert table["Band 1 (soft)", "mine", "virtual"][2] == "0.00, 1 failed"
+    assert not any("**" in cell for cell in table["Band 1 (soft)", "Package SI", "virtual"])
+    assert not any("**" in c for c in table["Band 1 (soft)", "actuation floor", "virtual, oracle"])
 
 
 def test_virtual_and_measured_launches_of_a_band_stand_apart() -> None:
@@ -80,19 +80,19 @@ def test_virtual_and_measured_launches_of_a_band_stand_apart() -> None:
     plain = launches([[0.5]], "measured", targets=[math.nan])  # aimed at nothing
     only = launches([[math.nan]] * 3, "predicted")
     trials = {"band1 sling2sim2real": both, "orange sling2sim2real": plain, "orange mine": only}
-    found = lines(benchmark(ran(trials)))
-    assert found["Band 1 (soft)", "Sling2Sim2Real", "virtual"][5] == "0 of 6"
-    assert found["Band 1 (soft)", "Sling2Sim2Real", "measured"][:4] == ["5.00"] * 3 + ["5.00"]
-    assert not any(band == "orange" for band, *_ in found)  # nothing there was aimed
+    table = lines(benchmark(ran(trials)))
+    assert table["Band 1 (soft)", "Sling2Sim2Real", "virtual"][5] == "0 of 6"
+    assert table["Band 1 (soft)", "Sling2Sim2Real", "measured"][:4] == ["5.00"] * 3 + ["5.00"]
+    assert not any(band == "orange" for band, *_ in table)  # nothing there was aimed
 
 
 def test_the_floor_is_a_row_of_its_band() -> None:
     floors = {"band2": floor((0.01, 0.02, 0.03), (0.003, 0.004, 0.005))}
     rows = benchmark(ran({"band2 sling2sim2real": CLOSE}, floors))
-    found = lines(rows)["Band 2 (medium)", "actuation floor", "virtual, oracle"]
+    cells = lines(rows)["Band 2 (medium)", "actuation floor", "virtual, oracle"]
     pooled = math.sqrt((9 + 16 + 25) / 3) / 10
-    assert found[:3] == ["1.00 ± 0.30", "2.00 ± 0.40", "3.00 ± 0.50"]
-    assert found[3:] == [f"2.00 ± {pooled:.2f}", "2.00", "0 of 60"]
+    assert cells[:3] == ["1.00 ± 0.30", "2.00 ± 0.40", "3.00 ± 0.50"]
+    assert cells[3:] == [f"2.00 ± {pooled:.2f}", "2.00", "0 of 60"]
 
 
 def test_ablations_stand_in_tables_of_their_own() -> None:
@@ -102,10 +102,10 @@ def test_ablations_stand_in_tables_of_their_own() -> None:
     third, fourth = (ablation(ran(trials), ms) for ms in (paper.OPTIMISERS, paper.ABLATIONS))
     assert {row.band for row in third} == {"band1"}
     assert {row.band for row in fourth} == {"band1", "orange"}
-    found = lines(third)
-    assert found["Band 1 (soft)", "DE_L", "virtual"][0] == "10.00 ± 0.00"
-    assert not any(method == "Adam_L" for _, method, _ in found)
-    assert found["Band 1 (soft)", "DE_L", "paper, real robot"][2] == "**3.00 ± 1.87**"
+    table = lines(third)
+    assert table["Band 1 (soft)", "DE_L", "virtual"][0] == "10.00 ± 0.00"
+    assert not any(method == "Adam_L" for _, method, _ in table)
+    assert table["Band 1 (soft)", "DE_L", "paper, real robot"][2] == "**3.00 ± 1.87**"
     order = list(dict.fromkeys(row.method for row in fourth))
     assert order == ["no_work", "sling2sim2real"]
     assert ablation(ran({"band1 sling2sim2real": CLOSE}), paper.OPTIMISERS) == []
@@ -115,8 +115,8 @@ def test_other_targets_have_columns_beside_the_papers() -> None:
     rows = benchmark(ran({"band1 sling2sim2real": launches([[0.01, 0.03]], targets=[1.6])}))
     heads, _ = as_table(rows, [1.6], NAMED)
     assert heads[3:8] == ["g = 160.0", "g = 172.5", "g = 192.5", "g = 212.5", "all targets"]
-    found = lines(rows, [1.6])["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
-    assert found[:4] == ["2.00 ± 1.41", "–", "–", "–"]
+    cells = lines(rows, [1.6])["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
+    assert cells[:4] == ["2.00 ± 1.41", "–", "–", "–"]
 
 
 def test_machines_read_the_same(tmp_path) -> None:

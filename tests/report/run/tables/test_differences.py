@@ -24,20 +24,20 @@ RAN = ran(
 def test_methods_are_held_against_ours_and_the_papers() -> None:
     heads, rows = as_table(compared(RAN, REFERENCES, 1), NAMED)
     assert heads[3:] == ["beside Sling2Sim2Real", "beside ours"]
-    found = {row[1]: row[2:] for row in rows}
-    assert found["Sling2Sim2Real"][1] == found["ours"][2] == "–"
-    assert found["Package SI"][2] == "**+15.00 (+15.00 to +15.00)**"
-    assert found["Real2Sim2Real"] == ["virtual", "N/A", "N/A"]
-    assert found["ours"][1].count("+") + found["ours"][1].count("−") == 3
+    table = {row[1]: row[2:] for row in rows}
+    assert table["Sling2Sim2Real"][1] == table["ours"][2] == "–"
+    assert table["Package SI"][2] == "**+15.00 (+15.00 to +15.00)**"
+    assert table["Real2Sim2Real"] == ["virtual", "N/A", "N/A"]
+    assert table["ours"][1].count("+") + table["ours"][1].count("−") == 3
     assert not any(row[0] == "orange" for row in rows)  # none of the two ran there
 
 
 def test_machines_read_the_same(tmp_path) -> None:
     read = records(compared(RAN, REFERENCES, 1)).set_index(["method", "beside"])
-    one = read.loc["package_si", "least_squares"]
-    assert one.difference_cm == pytest.approx(15) and one.launches == 15 and one.left_out == 0
-    assert (one.launches_beside, one.failed_share, one.failed_share_beside) == (15, 0, 0)
-    assert one.low_95_cm <= 15.001 and one.high_95_cm >= 14.999
+    row = read.loc["package_si", "least_squares"]
+    assert row.difference_cm == pytest.approx(15) and row.launches == 15 and row.left_out == 0
+    assert (row.launches_beside, row.failed_share, row.failed_share_beside) == (15, 0, 0)
+    assert row.low_95_cm <= 15.001 and row.high_95_cm >= 14.999
     assert ("real2sim2real", "least_squares") not in read.index
     some = launches(NOISE, "measured", failed=3), launches(NOISE, "measured", failed=6)
     both = ran({"band1 sling2sim2real": some[0], "band1 bo": some[1]})

@@ -36,6 +36,6 @@ def test_hanging_lengths_stand_beside_the_rigs() -> None:
         Hanging(BAND, None, 0.26, {2: 0.40, 1: np.nan}, 1.6),
         Hanging(BAND, METHOD, 0.26, {2: 0.44, 1: 0.5}, 1.6),
     ]
-    _, (true, found) = evaluation.hanging_table(rows, NAMED)
+    _, (true, identified) = evaluation.hanging_table(rows, NAMED)
     assert true[1:] == ["the rig's rubber", "26", "40.0", "not held"]
-    assert found[1:] == ["Sling2Sim2Real", "26", "44.0* (+10 %)", "50.0*"]
+    assert identified[1:] == ["Sling2Sim2Real", "26", "44.0* (+10 %)", "50.0*"]

@@ -18,8 +18,7 @@ from pipeline.report.run.tables.identified import (
 from pipeline.report.run.tables.policies import policies
 from tests.hostile import MARKUP
 from tests.report.run.conftest import BAND, METHOD, episode
-from tests.report.run.tables.toy_results import launches
-from tests.report.run.tables.toy_results import result as one
+from tests.report.run.tables.toy_results import launches, result
 from tests.report.run.tables.toy_results import results as all_of
 from tests.report.run.toy_replay import toy_replay
 
@@ -81,9 +80,9 @@ def test_what_a_recording_leaves_and_how_the_others_would_have_it(results, named
     assert column(table, "force [mN]") == ["41"] and column(table, "recoil [mm]") == ["2.1"]
     assert column(table, "recoil seen after [ms]") == ["12"]
     assert column(table, "misfit without it") == ["–"]
-    about = results.methods[BAND][METHOD].theta["confidence"]
+    confidence = results.methods[BAND][METHOD].theta["confidence"]
     without = {"misfit": 3.21, "moved": {"mooney_share": 0.4, "log_loss_factor": -1.26}}
-    about["recordings"][0]["without_it"] = without
+    confidence["recordings"][0]["without_it"] = without
     table = recordings(results, named)
     assert column(table, "misfit without it") == ["3.2"]
     assert column(table, "which moves") == ["log loss factor -1.3 sd"]
@@ -91,8 +90,8 @@ def test_what_a_recording_leaves_and_how_the_others_would_have_it(results, named
 
 def test_launches_that_were_evidence_are_named(results, named) -> None:
     assert observed(results, named) is None
-    about = results.methods[BAND][METHOD].theta["confidence"]
-    about["launches"] = [{"draw": [-0.3, -0.15], "landing": 1.9, "left": 0.021}]
+    confidence = results.methods[BAND][METHOD].theta["confidence"]
+    confidence["launches"] = [{"draw": [-0.3, -0.15], "landing": 1.9, "left": 0.021}]
     table = observed(results, named)
     assert column(table, "draw (y, z) [m]") == ["-0.300, -0.150"]
     assert column(table, "farther than simulated") == ["+2.1 %"]
@@ -126,9 +125,9 @@ def test_held_out_residuals_stand_beside_the_fitted(params) -> None:
     }  # one that knows nothing takes nothing from the other
     replays = {"de": toy_replay(*inputs), METHOD: toy_replay(*inputs, residuals=residuals)}
     heads, rows = held_out({BAND: replays}, named)
-    unknown, known = rows
+    unknown, complete = rows
     assert unknown == [BAND, "DE_L", "0.200", "–", "–", "0.20", "–", "–"]
-    assert known == [BAND, "Sling2Sim2Real", "0.200", "0.300", "1.50", "0.50", "0.25", "0.50"]
+    assert complete == [BAND, "Sling2Sim2Real", "0.200", "0.300", "1.50", "0.50", "0.25", "0.50"]
     assert heads[2:5] == ["force [N], fitted", "force [N], held out", "force [N], ratio"]
 
 
@@ -139,8 +138,8 @@ def card(**training) -> dict:
 
 def test_policies_stand_with_their_errors() -> None:
     trials, named = launches([[0.0]] * 3), styles(["package_si", "sling2sim2real"])
-    ours = one("band1", "sling2sim2real", trials, card=card(converged=False))
-    theirs = one("band1", "package_si", trials, card=card(mean_error_m=None))
+    ours = result("band1", "sling2sim2real", trials, card=card(converged=False))
+    theirs = result("band1", "package_si", trials, card=card(mean_error_m=None))
     _, (first, other) = policies(all_of(ours, theirs), named)
     assert first[1:3] == ["Sling2Sim2Real", "**no**"]
     assert first[3:] == ["0.40", "1.00", "2", "0.03", "–"]
@@ -149,8 +148,8 @@ def test_policies_stand_with_their_errors() -> None:
 
 @pytest.mark.parametrize("name", MARKUP)
 def test_a_file_of_any_name_has_one_cell(results, named, name) -> None:
-    about = results.methods[BAND][METHOD].theta["confidence"]
-    about["recordings"][0]["source"] = {"file": name}
+    confidence = results.methods[BAND][METHOD].theta["confidence"]
+    confidence["recordings"][0]["source"] = {"file": name}
     heads, rows = recordings(results, named)
     text = markdown((heads, rows))
     assert text.replace("\n", "").isprintable() and text.count("\n") == 2 + len(rows)

@@ -71,8 +71,8 @@ def test_no_launch_is_no_table() -> None:
 
 def test_values_of_a_band_with_and_without_intervals() -> None:
     trials = launches([[0.0]] * 3)
-    known = results(result("mine", MAIN, trials))
-    heads, (row,) = values(known, ["mine"], MAIN)
+    with_intervals = results(result("mine", MAIN, trials))
+    heads, (row,) = values(with_intervals, ["mine"], MAIN)
     assert heads == ["band", "E [kPa]", "damping s·d [ms]"]
     assert row == ["mine", "300 (270 – 330)", "2.10 (1.90 – 2.30)"]
     bare = results(result("mine", MAIN, trials, confidence={}))

@@ -21,8 +21,8 @@ TRIALS = launches([[0.0]] * 3)
 
 def table_of(**more) -> list[list[str]]:
     """Rows of band1's Sling2Sim2Real, ours first."""
-    found = results(result("band1", "sling2sim2real", TRIALS, **more))
-    rows = as_table(identified(found, PARAMS), NAMED)[1]
+    outcome = results(result("band1", "sling2sim2real", TRIALS, **more))
+    rows = as_table(identified(outcome, PARAMS), NAMED)[1]
     return [row for row in rows if row[:2] == ["Band 1 (soft)", "Sling2Sim2Real"]]
 
 
@@ -39,8 +39,8 @@ def test_the_edge_is_that_of_the_methods_own_bounds() -> None:
     method = PARAMS.methods["sling2sim2real"]
     close = method.model_copy(update={"bounds": {"poissons_ratio": (0.44, 0.45005)}})
     ran = results(result("band1", "sling2sim2real", TRIALS))
-    for about, expected in ((method, False), (close, True)):
-        params = PARAMS.model_copy(update={"methods": {"sling2sim2real": about}})
+    for variant, expected in ((method, False), (close, True)):
+        params = PARAMS.model_copy(update={"methods": {"sling2sim2real": variant}})
         (ours,) = [row for row in identified(ran, params) if row.source == "virtual"]
         assert ours.values["poissons_ratio"].at_edge == expected
 
@@ -73,11 +73,11 @@ def test_what_no_posterior_knows_is_a_number_alone() -> None:
 
 
 def test_a_theta_outside_its_interval_and_at_an_edge() -> None:
-    about = confidence()
-    about["parameters"]["poissons_ratio"] |= {"low": 0.4891, "high": 0.4899}
-    about["parameters"]["youngs_modulus"] |= {"low": 3.0011e5, "high": 3.0014e5}
+    posterior = confidence()
+    posterior["parameters"]["poissons_ratio"] |= {"low": 0.4891, "high": 0.4899}
+    posterior["parameters"]["youngs_modulus"] |= {"low": 3.0011e5, "high": 3.0014e5}
     theta = {"theta": THETA | {"damping_scale": 0.999}}
-    ours, _ = table_of(confidence=about, theta=theta)
+    ours, _ = table_of(confidence=posterior, theta=theta)
     assert ours[3] == "300 † (300.11 – 300.14)"
     assert ours[4] == "0.45 † (0.489 – 0.490)"
     assert ours[7] == "1.00 ⚠ † (0.63 – 0.77)" and ours[8] == "–"
@@ -90,11 +90,11 @@ def test_the_loss_is_the_papers_whatever_a_method_minimised() -> None:
 
 
 def test_only_what_ran_has_rows() -> None:
-    found = results(result("band1", "adam", TRIALS), result("orange", "package_si", TRIALS))
+    outcome = results(result("band1", "adam", TRIALS), result("orange", "package_si", TRIALS))
     bands = {**PARAMS.bands, "orange": SimpleNamespace(source="recording")}
     rows = as_table(
         identified(
-            found,
+            outcome,
             SimpleNamespace(bands=bands, methods=PARAMS.methods, parameters=PARAMS.parameters),
         ),
         NAMED,

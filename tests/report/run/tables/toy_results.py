@@ -38,8 +38,8 @@ def result(band: str, method: str, trials: pd.DataFrame, **more) -> SimpleNamesp
 
 def results(*some: SimpleNamespace, floors: dict | None = None) -> Results:
     methods: dict[str, dict] = {}
-    for one in some:
-        methods.setdefault(one.band, {})[one.method] = one
+    for method_result in some:
+        methods.setdefault(method_result.band, {})[method_result.method] = method_result
     return Results({}, methods, floors or {})
 
 

@@ -34,7 +34,7 @@ from rig.oracle.world import World
 from validation.campaigns import runner
 from validation.campaigns.landings import SETS, together
 from validation.campaigns.rig_scores import (
-    calibrated_clamps,
+    built,
     recorded,
     saved,
     scored,
@@ -99,14 +99,11 @@ class BandRecording:
     def episode(self, work: Path, orange: Path | None) -> Path:
         """The folder of its episode and clamps, made where they are missing."""
         folder = work / "episodes" / self.group / self.pull / self.band / str(self.number)
-        if self.group != "orange":
+        if self.group == "orange":
+            raw = Path(orange or ".") / f"{OF_ORANGE[self.number]}.mcap"
+            built(self.params, ORANGE, raw, folder)
+        else:
             recorded(self.params, self.band, folder)
-        elif not (folder / "mounting.json").exists():
-            from pipeline.recording.build import build_episodes  # needs Open3D
-
-            path = Path(orange or ".") / f"{OF_ORANGE[self.number]}.mcap"
-            episode = build_episodes(path, ORANGE, self.params)[0][0]
-            calibrated_clamps(self.params, ORANGE, episode, folder)
         return folder
 
 
@@ -133,16 +130,6 @@ def recordings(orange: Path | None, pulls=("informative", "paper")) -> list[Band
     return [
         BandRecording("orange", ORANGE, "paper", number) for number in range(count)
     ] + rig_recordings
-
-
-def with_change(params: Params, method: str) -> tuple[Params, str]:
-    """params.yaml and the name of its method that a variant stands for."""
-    if method == "no_softening":
-        ours = params.methods[OURS]
-        fixed = ours.model_copy(update={"fixed": {**ours.fixed, "softening": 0.0}})
-        methods = {**dict(params.methods.items()), method: fixed}
-        return params.model_copy(update={"methods": methods}), method
-    return params, method if method in params.methods else OURS
 
 
 @contextmanager
@@ -172,7 +159,8 @@ def with_first_picture(episode: Episode) -> Episode:
 def identified(job: VariantJob, work: Path, orange: Path | None) -> dict:
     """Scores of a variant by one recording."""
     folder = job.recording.episode(work, orange)
-    params, method = with_change(job.params, job.method)
+    params = job.params
+    method = job.method if job.method in params.methods else OURS
     episode, sling = Episode.load(folder / "episode"), sling_of(params, job.band, method, folder)
     if job.method == "first_picture":
         episode = with_first_picture(episode)

@@ -36,17 +36,23 @@ MAP = 17, 13  # simulated launches that tell where to seek
 
 def recorded(params: Params, band: str, folder: Path) -> Episode:
     """The episode of a recording that the rig makes, clamps beside it; kept in `folder`."""
-    from pipeline.recording.build import build_episodes  # both need Open3D, scores do not
-    from rig.recorder.record import record
+    from rig.recorder.record import record  # needs Open3D, scores do not
 
-    mounting = folder / "mounting.json"
-    if not mounting.exists():
+    if not (folder / "mounting.json").exists():
         raw = folder / f"{band}.mcap"
         raw.parent.mkdir(parents=True, exist_ok=True)
         record(params, band, raw)
-        episode = build_episodes(raw, band, params)[0][0]
+        built(params, band, raw, folder)
         raw.unlink()
-        calibrated_clamps(params, band, episode, folder)
+    return Episode.load(folder / "episode")
+
+
+def built(params: Params, band: str, raw: Path, folder: Path) -> Episode:
+    """The episode of a recording that is there, clamps beside it; kept in `folder`."""
+    from pipeline.recording.build import build_episodes  # needs Open3D
+
+    if not (folder / "mounting.json").exists():
+        calibrated_clamps(params, band, build_episodes(raw, band, params)[0][0], folder)
     return Episode.load(folder / "episode")
 
 

@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 
 from pipeline.base.code import ROOT
-from pipeline.episode.episode import Episode
 from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params import Params
-from pipeline.recording.build import build_episodes
 from validation import density
-from validation.campaigns.rig_scores import calibrated_clamps, sling_of
+from validation.campaigns.rig_scores import built, sling_of
 from validation.campaigns.runner import OURS
 from validation.orange import landings, with_orange
 
@@ -33,7 +31,10 @@ def test_recordings_that_this_project_did_not_make(params: Params, progress, rec
     params = with_orange(params)
     draws, measured = landings(RECORDINGS_OF_ORANGE)
     names = ("orange", "orange_2", "orange_3")
-    episodes = [orange_episode(params, name) for name in names]
+    episodes = [
+        built(params, "orange", RECORDINGS_OF_ORANGE / f"{name}.mcap", FOLDER / name)
+        for name in names
+    ]
     figures = {}
     for name, subset in [
         *zip(names, [[episode] for episode in episodes], strict=True),
@@ -65,10 +66,3 @@ def test_recordings_that_this_project_did_not_make(params: Params, progress, rec
         figures=figures,
     )
     assert all(figure["inside"] >= 0.85 * figure["launches"] for figure in figures.values())
-
-
-def orange_episode(params: Params, name: str) -> Episode:
-    path, folder = RECORDINGS_OF_ORANGE / f"{name}.mcap", FOLDER / name
-    if not (folder / "mounting.json").exists():
-        calibrated_clamps(params, "orange", build_episodes(path, "orange", params)[0][0], folder)
-    return Episode.load(folder / "episode")

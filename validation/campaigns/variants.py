@@ -39,7 +39,7 @@ PRIOR_CHANGES = {
     "prior_loss_up": (1.0, 1.4),
     "prior_loss_down": (1.0, 0.6),
 }
-LAW_CHANGES = "search_rubber", "density_neo_hookean"
+LAW_CHANGES = "search_rubber", "density_neo_hookean", "no_softening"
 BESIDE = {*SETTINGS, *WEIGHTS, *PRIOR_CHANGES, *LAW_CHANGES}  # what no campaign runs unasked
 # Gaussian processes of thousands of points cost more than the simulations: a large budget is less.
 BAYES, BAYES_LARGE = (
@@ -78,6 +78,7 @@ def with_variants(params: Params) -> Params:
     methods |= {
         "search_rubber": methods[PAPER].model_copy(update=rubber),
         "density_neo_hookean": density.model_copy(update=plain),
+        "no_softening": density.model_copy(update={"fixed": {**density.fixed, "softening": 0.0}}),
     }
     return params.model_copy(update={"methods": methods})
 

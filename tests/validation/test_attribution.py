@@ -1,0 +1,89 @@
+"""The campaign of one change at a time: what a variant is, and what the page has of it."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.episode.episode import Episode
+from pipeline.identify.posterior.likelihood import Tolerances
+from pipeline.params import load
+from tests.project import ROOT
+from validation.campaigns.attribution import (
+    METHODS,
+    PAGE,
+    REPORT,
+    against_given,
+    block,
+    less_trust,
+    with_first_picture,
+)
+from validation.campaigns.runner import OURS
+from validation.campaigns.variants import with_variants
+from validation.projects import DEFAULTS
+
+
+@pytest.fixture
+def episode() -> Episode:
+    """Of a held band and three pictures of its recoil, the latest stamped first."""
+    signals, points = np.zeros((2, 3)), np.ones((5, 3), np.float32)
+    return Episode(
+        band="orange",
+        time=np.array([0.0, 1.0]),
+        position=signals,
+        velocity=signals,
+        force=signals,
+        opening=np.zeros(2),
+        cloud_time=np.array([0.5, 1.09, 1.01, 1.05]),
+        clouds=[points] * 4,
+        grasp_time=0.0,
+        release_time=1.0,
+        camera=np.zeros(3),
+        metadata={"preprocessing": {"release_error": 1e-4}},
+    )
+
+
+def test_every_variant_is_a_method_or_a_change_of_ours() -> None:
+    methods = with_variants(load(DEFAULTS)).methods
+    others = METHODS.keys() - methods.keys()
+    assert others == {"first_picture", "recoil_trusted_half"}
+    assert methods["no_softening"].fixed == {**methods[OURS].fixed, "softening": 0.0}
+
+
+def test_of_the_recoil_one_picture_stays(episode) -> None:
+    one_picture = with_first_picture(episode)
+    seen = np.array([len(cloud) > 0 for cloud in episode.clouds])
+    left = np.array([len(cloud) > 0 for cloud in one_picture.clouds])
+    after = episode.cloud_time > episode.release_time
+    assert seen[after].sum() > 1 and left[after].sum() == 1
+    assert left[after].argmax() == episode.cloud_time[after].argmin() == 1
+    assert np.array_equal(seen[~after], left[~after])
+
+
+def test_a_recoil_is_trusted_half_within_the_block_alone(episode) -> None:
+    usual = Tolerances.of(episode)
+    with less_trust("recoil_trusted_half"):
+        assert Tolerances.of(episode) == replace(usual, way=2 * Tolerances.way)
+    with less_trust(OURS):
+        assert Tolerances.of(episode) == usual
+    assert Tolerances.of(episode) == usual
+
+
+def test_errors_of_given_landings_are_of_what_was_predicted() -> None:
+    class Simulator:
+        samples = None
+
+        def __call__(self, draws):
+            return type("Launches", (), {"landing_y": np.array([2.0, 1.0])})
+
+    scores = against_given(Simulator(), load(DEFAULTS), np.zeros((2, 2)), np.array([2.2, 0.9]))
+    assert scores["error"] == pytest.approx([0.1, -0.1])
+    assert scores["miss"] == pytest.approx([0.2, -0.1])
+    assert np.isnan(scores["low"]).all() and not scores["inside"].any()
+
+
+def test_the_page_has_the_table_of_the_committed_report() -> None:
+    content = json.loads((ROOT / REPORT).read_text(encoding="utf-8"))
+    assert content["jobs"][0] == content["jobs"][1]
+    assert block(content) in (ROOT / PAGE).read_text(encoding="utf-8")

@@ -8,6 +8,7 @@ import pytest
 
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.likelihood import Tolerances
+from pipeline.identify.posterior.residuals import Rule
 from pipeline.params import load
 from tests.project import ROOT
 from validation.campaigns.attribution import (
@@ -16,8 +17,7 @@ from validation.campaigns.attribution import (
     REPORT,
     against_given,
     block,
-    less_trust,
-    with_first_picture,
+    recoil_of,
 )
 from validation.campaigns.runner import OURS
 from validation.campaigns.variants import with_variants
@@ -27,7 +27,7 @@ from validation.projects import DEFAULTS
 @pytest.fixture
 def episode() -> Episode:
     """Of a held band and three pictures of its recoil, the latest stamped first."""
-    signals, points = np.zeros((2, 3)), np.ones((5, 3), np.float32)
+    signals, points = np.zeros((2, 3)), np.full((5, 3), -1.0, np.float32)
     return Episode(
         band="orange",
         time=np.array([0.0, 1.0]),
@@ -35,7 +35,7 @@ def episode() -> Episode:
         velocity=signals,
         force=signals,
         opening=np.zeros(2),
-        cloud_time=np.array([0.5, 1.09, 1.01, 1.05]),
+        cloud_time=np.array([0.9, 1.09, 1.01, 1.045]),
         clouds=[points] * 4,
         grasp_time=0.0,
         release_time=1.0,
@@ -47,25 +47,23 @@ def episode() -> Episode:
 def test_every_variant_is_a_method_or_a_change_of_ours() -> None:
     methods = with_variants(load(DEFAULTS)).methods
     others = METHODS.keys() - methods.keys()
-    assert others == {"first_picture", "recoil_trusted_half"}
+    assert others == {"later_pictures", "recoil_trusted_half"}
     assert methods["no_softening"].fixed == {**methods[OURS].fixed, "softening": 0.0}
 
 
-def test_of_the_recoil_one_picture_stays(episode) -> None:
-    one_picture = with_first_picture(episode)
-    seen = np.array([len(cloud) > 0 for cloud in episode.clouds])
-    left = np.array([len(cloud) > 0 for cloud in one_picture.clouds])
-    after = episode.cloud_time > episode.release_time
-    assert seen[after].sum() > 1 and left[after].sum() == 1
-    assert left[after].argmax() == episode.cloud_time[after].argmin() == 1
-    assert np.array_equal(seen[~after], left[~after])
+def test_later_pictures_of_a_recoil_count_within_the_block_alone(episode) -> None:
+    usual = Rule().frames(episode)
+    assert usual.tolist() == [0, 2]
+    with recoil_of("later_pictures"):
+        assert Rule().frames(episode).tolist() == [0, 2, 3]
+    assert Rule().frames(episode).tolist() == usual.tolist()
 
 
 def test_a_recoil_is_trusted_half_within_the_block_alone(episode) -> None:
     usual = Tolerances.of(episode)
-    with less_trust("recoil_trusted_half"):
+    with recoil_of("recoil_trusted_half"):
         assert Tolerances.of(episode) == replace(usual, way=2 * Tolerances.way)
-    with less_trust(OURS):
+    with recoil_of(OURS):
         assert Tolerances.of(episode) == usual
     assert Tolerances.of(episode) == usual
 

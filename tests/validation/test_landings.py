@@ -7,8 +7,8 @@ import pytest
 
 from tests.project import ROOT
 from validation.campaigns.landings import (
+    ONE_DIP,
     PAGE,
-    SEARCHED,
     SETS,
     OneRecording,
     block,
@@ -40,14 +40,12 @@ def test_each_band_is_recorded_by_both_pulls_and_once_after_it_was_drawn() -> No
     assert job.params.rig.pull == "informative" and job.params.bands["develop1"].preconditioned
 
 
-def test_searched_dips_are_recorded_on_the_bands_that_a_choice_may_rest_on() -> None:
-    every = jobs(SEARCHED)
+def test_one_dip_is_recorded_on_the_bands_that_a_choice_may_rest_on() -> None:
+    every = jobs(ONE_DIP)
     assert {job.band for job in every} == {*SETS["develop"][1], *SETS["bands"][1]}
-    dips = every[0].params.plan.dips
-    assert (
-        len(dips) == 3
-        and dips != OneRecording(DEVELOP, "band1", "paper", False, 0).params.plan.dips
-    )
+    plain = OneRecording(DEVELOP, "band1", "informative", False, 0).params.plan
+    (dip,) = every[0].params.plan.dips
+    assert dip.depth < min(deep.depth for deep in plain.dips) and len(plain.dips) == 3
     assert every[0].params.rig.pull == "informative"
 
 

@@ -3,7 +3,7 @@
     python -m validation.campaigns.attribution --orange FOLDER
     python -m validation.campaigns.attribution --page      # the table of docs/paper.md
 
-Recordings: of each rig band and of each sealed rubber by the dip and by the paper's pull, and the
+Recordings: of each rig band and of 16 once sealed rubbers by dips and by the paper's pull, and the
 three of `orange` in FOLDER, which this project did not make. Each is recorded once, and identified
 by every variant: by the paper's search with either law, by our density with either law, and by our
 density with other priors or less trust in the recoil. Landings are scored as by
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -28,6 +28,7 @@ from pipeline.base.environment import environment
 from pipeline.base.files import write_json, write_text
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.likelihood import Tolerances, opening_time
+from pipeline.identify.posterior.residuals import Rule
 from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params import Params, load
 from rig.oracle.world import World
@@ -48,7 +49,7 @@ from validation.marked import marks, with_block
 from validation.orange import NAME as ORANGE
 from validation.orange import landings, with_orange
 from validation.projects import DEFAULTS
-from validation.rubbers import with_rubbers
+from validation.rubbers import SPENT, rubbers, with_rubbers
 
 METHODS = {  # and the words of the table
     PAPER: "the paper's search, neo-Hookean",
@@ -60,17 +61,18 @@ METHODS = {  # and the words of the table
     "prior_twice": "… priors twice as wide",
     "prior_loss_up": "… loss factor expected 40 % higher",
     "prior_loss_down": "… loss factor expected 40 % lower",
-    "first_picture": "… the recoil's first picture alone",
+    "later_pictures": "… the recoil's pictures of 50 ms instead of 34",
     "recoil_trusted_half": "… a recoil's picture trusted half as much",
 }
 RECORDINGS = {"bands": 3, "sealed": 1}
+BANDS = {"bands": SETS["bands"][:2], "sealed": (SPENT, tuple(rubbers(SPENT)))}  # seed, names
 OF_ORANGE = "orange", "orange_2", "orange_3"
 REPORT, PAGE = Path("reports/validation/attribution.json"), Path("docs/paper.md")
 COLUMNS = {  # of the table
-    ("bands", "informative"): "rig bands, dip",
+    ("bands", "informative"): "rig bands, dips",
     ("bands", "paper"): "rig bands, the paper's pull",
-    ("sealed", "informative"): "sealed, dip",
-    ("sealed", "paper"): "sealed, the paper's pull",
+    ("sealed", "informative"): "once sealed, dips",
+    ("sealed", "paper"): "once sealed, the paper's pull",
     ("orange", "paper"): "`orange`, the paper's pull",
 }
 
@@ -80,7 +82,7 @@ class BandRecording:
     """One recording of a band.
 
     Attributes:
-        group: Of bands: "bands", "sealed" or "orange".
+        group: Of bands: "bands", "sealed" (once), or "orange".
         number: Of the recording; of `orange` its file's.
     """
 
@@ -93,7 +95,7 @@ class BandRecording:
     def params(self) -> Params:
         if self.group == "orange":
             return with_variants(with_orange(load(DEFAULTS)))
-        seed = SETS[self.group][0]
+        seed = BANDS[self.group][0]
         return with_variants(with_rubbers(load(DEFAULTS), seed, self.number, self.pull))
 
     def episode(self, work: Path, orange: Path | None) -> Path:
@@ -124,7 +126,7 @@ def recordings(orange: Path | None, pulls=("informative", "paper")) -> list[Band
         for group, most in RECORDINGS.items()
         for number in range(most)
         for pull in pulls
-        for band in SETS[group][1]
+        for band in BANDS[group][1]
     ]
     count = len(OF_ORANGE) if orange else 0
     return [
@@ -133,27 +135,22 @@ def recordings(orange: Path | None, pulls=("informative", "paper")) -> list[Band
 
 
 @contextmanager
-def less_trust(method: str) -> Iterator[None]:
-    """Within it a picture of the recoil has twice the deviation of the way gone."""
-    if method != "recoil_trusted_half":
-        yield
-        return
-    usual = Tolerances.of
+def recoil_of(method: str) -> Iterator[None]:
+    """Within it what a method's name says of the recoil's pictures: less trust, or later ones too."""
+    trusted, counted = Tolerances.of, Rule.frames
 
     def doubled(episode: Episode) -> Tolerances:
-        return replace(usual(episode), way=2 * Tolerances.way)
+        return replace(trusted(episode), way=2 * Tolerances.way)
 
-    with mock.patch.object(Tolerances, "of", doubled):
+    def later(rule: Rule, episode: Episode) -> np.ndarray:
+        return counted(replace(rule, recoil=rule.latest), episode)
+
+    with ExitStack() as stack:
+        if method == "recoil_trusted_half":
+            stack.enter_context(mock.patch.object(Tolerances, "of", doubled))
+        if method == "later_pictures":
+            stack.enter_context(mock.patch.object(Rule, "frames", later))
         yield
-
-
-def with_first_picture(episode: Episode) -> Episode:
-    """An episode whose camera saw the recoil once."""
-    after = np.flatnonzero(episode.cloud_time > episode.release_time)
-    later = set(after[np.argsort(episode.cloud_time[after])][1:].tolist())
-    nothing = np.empty((0, 3), np.float32)
-    clouds = [nothing if k in later else cloud for k, cloud in enumerate(episode.clouds)]
-    return replace(episode, clouds=clouds)
 
 
 def identified(job: VariantJob, work: Path, orange: Path | None) -> dict:
@@ -162,11 +159,9 @@ def identified(job: VariantJob, work: Path, orange: Path | None) -> dict:
     params = job.params
     method = job.method if job.method in params.methods else OURS
     episode, sling = Episode.load(folder / "episode"), sling_of(params, job.band, method, folder)
-    if job.method == "first_picture":
-        episode = with_first_picture(episode)
     friction = params.methods[OURS].fixed["dynamic_friction"]
     sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
-    with priors_of(job.method), less_trust(job.method):
+    with priors_of(job.method), recoil_of(job.method):
         outcome, confidence = calibrated_by(params, method, sling, [episode])
     if job.group == "orange":
         scores = against_given(outcome, params, *landings(Path(orange or ".")))
@@ -183,7 +178,7 @@ def identified(job: VariantJob, work: Path, orange: Path | None) -> dict:
 
 def params_of_rig(job: VariantJob) -> Params:
     """What the rig's own processes read: without the variants."""
-    return with_rubbers(load(DEFAULTS), SETS[job.group][0], job.number, job.pull)
+    return with_rubbers(load(DEFAULTS), BANDS[job.group][0], job.number, job.pull)
 
 
 def against_given(

@@ -32,7 +32,7 @@ from validation.campaigns import runner
 from validation.campaigns.runner import ResultLines, plain, result_of
 from validation.marked import marks, with_block
 from validation.recordings.faults import FAULTS
-from validation.rubbers import DEVELOP, SEALED, rubbers, with_rubbers
+from validation.rubbers import DEVELOP, SPENT, rubbers, with_rubbers
 
 WORK, REPORT = Path("data/field"), Path("reports/validation/field.json")
 PAGE, BLOCK = Path("docs/recording.md"), "field"
@@ -40,7 +40,7 @@ SOUND = "none"  # the fault of a sound recording
 FAULTY = "orange_2", "band1_1001"  # what faults are done to
 ORANGE = "orange", "orange_2", "orange_3"
 RIG = tuple(f"band{band}_{seed}" for seed in (1001, 1002) for band in (1, 2, 3))
-RUBBERS = {name: seed for seed in (DEVELOP, SEALED) for name in rubbers(seed)}
+RUBBERS = {name: seed for seed in (DEVELOP, SPENT) for name in rubbers(seed)}
 MODULUS, DAMPING = 0.025, 1.6  # share of E, factor of s·d, within which a value is right
 CORRECT, CAUTIONED, REFUSED = "correct", "cautioned", "refused"
 MISNAMED, SILENT = "misnamed", "silently wrong"

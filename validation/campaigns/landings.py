@@ -3,7 +3,7 @@
     python -m validation.campaigns.landings develop
     python -m validation.campaigns.landings sealed     # once: validation/rubbers.py has the rules
     python -m validation.campaigns.landings bands
-    python -m validation.campaigns.landings searched   # the rule on three dips, beside these two
+    python -m validation.campaigns.landings one_dip    # the rule on dips: these two by a single one
 
 Each band is recorded by the paper's pull and by the informative one (`plan.dips`), virgin and as it
 is after an earlier pull, and identified by the default method from that one recording; nine targets
@@ -54,8 +54,8 @@ from validation.projects import DEFAULTS
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
 PULLS = "paper", "informative"
-SEARCHED = "searched"  # the dips that validation/campaigns/pulls.py has found, instead of plan.dips
-SEARCHED_DIPS = Path("reports/validation/pulls.json")
+ONE_DIP = "one_dip"  # instead of plan.dips, which validation/campaigns/pulls.py has searched
+DIPS = Path("reports/validation/pulls.json")
 PAGE, README, BLOCK = Path("docs/identification.md"), Path("README.md"), "landings"
 OTHERWISE: tuple[tuple[str, dict], ...] = (  # how the first recording of a band is identified too
     ("informative", {"launched": True}),
@@ -94,14 +94,14 @@ class OneRecording:
 
     @property
     def params(self) -> Params:
-        pull = "informative" if self.pull == SEARCHED else self.pull
+        pull = "informative" if self.pull == ONE_DIP else self.pull
         params = with_rubbers(load(DEFAULTS), self.seed, self.number, pull, self.worn)
-        return params if pull == self.pull else with_searched_dips(params)
+        return params if pull == self.pull else with_one_dip(params)
 
 
-def with_searched_dips(params: Params) -> Params:
-    """params.yaml with three dips instead of its own."""
-    dips = json.loads(SEARCHED_DIPS.read_text(encoding="utf-8"))["dips"][SEARCHED]
+def with_one_dip(params: Params) -> Params:
+    """params.yaml with a single dip instead of its own."""
+    dips = json.loads(DIPS.read_text(encoding="utf-8"))["dips"][ONE_DIP]
     content = params.model_dump(mode="json", exclude_unset=True)
     content["plan"]["dips"] = dips
     return Params.model_validate(content)
@@ -116,9 +116,9 @@ SETS = {
 
 def jobs(name: str, most: int = TEN, pulls: Sequence[str] = PULLS) -> list[OneRecording]:
     """At most so many recordings of each band of a set by each pull, worn ones once."""
-    if name == SEARCHED:
+    if name == ONE_DIP:
         numbers, bands = range(min(RECORDINGS, most)), (*SETS["develop"][1], *BANDS)
-        return [OneRecording(DEVELOP, band, SEARCHED, False, n) for n in numbers for band in bands]
+        return [OneRecording(DEVELOP, band, ONE_DIP, False, n) for n in numbers for band in bands]
     seed, bands, count, states = SETS[name]
     return [
         OneRecording(seed, band, pull, False, 0, **otherwise)
@@ -237,12 +237,12 @@ def together(of_bands: dict[str, dict]) -> dict:
 
 
 ROWS = {  # of the page's table
-    "informative, virgin": "one dip",
-    "informative, virgin, one launch": "one dip, one launch measured",
-    "informative, virgin, the paper's method": "one dip, by the paper's method",
+    "informative, virgin": "dips",
+    "informative, virgin, one launch": "dips, one launch measured",
+    "informative, virgin, the paper's method": "dips, by the paper's method",
     "paper, virgin": "the paper's pull",
     "paper, virgin, the paper's method": "the paper's pull, by the paper's method",
-    "informative, worn": "one dip, drawn before",
+    "informative, worn": "dips, drawn before",
     "paper, worn": "the paper's pull, drawn before",
 }
 WORDS = {"bands": "the rig's three bands", "develop": "four to develop on", "sealed": "16 sealed"}
@@ -288,7 +288,7 @@ def sentence(content: dict) -> str:
         for kind in ("paper, virgin", "paper, virgin, the paper's method")
     )
     text = (
-        f"On {len(bands)} further virtual rubbers, which took part in no choice, by one dip:"
+        f"On {len(bands)} further virtual rubbers, which took part in no choice, by the pull with dips:"
         f" predictions are off by {size:.1f} % of the distance in the mean over rubbers"
         f" ({abs(worst):.1f} % at worst), and {inside:.0f} % of the launches land in their 90 %"
         f" intervals, which are {width:.0f} % of the distance wide. By the paper's pull they"
@@ -298,12 +298,12 @@ def sentence(content: dict) -> str:
 
 
 def report_of(name: str) -> Path:
-    return Path(f"reports/validation/landings-{name}.json")
+    return Path(f"reports/validation/landings-{name.replace('_', '-')}.json")
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("set", choices=[*SETS, SEARCHED])
+    parser.add_argument("set", choices=[*SETS, ONE_DIP])
     parser.add_argument("--page", action="store_true", help=f"only write into {PAGE} and {README}")
     parser.add_argument("--work", type=Path, default=Path(".checkpoints/landings"))
     parser.add_argument("--workers", type=int, default=cores())

@@ -52,7 +52,7 @@ USERS = ("string", "launch", "servo", "rubber")  # modules of rig.physics that i
 def lsoda(tight: float) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
     """`rig.physics.integration.integrated` by SciPy's LSODA, at a tolerance of its own."""
 
-    def integrated(rates, y, times, data, rtol, atol, *, event=None, **_):
+    def integrated(rates, y, times, data, rtol, atol, *, event=None, max_step=np.inf, **_):
         def change(t: float, flat: np.ndarray) -> np.ndarray:
             out = np.empty_like(flat)
             rates(t, flat, out, data)
@@ -69,6 +69,7 @@ def lsoda(tight: float) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
             t_eval=times,
             rtol=tight,
             atol=atol * tight / rtol,
+            max_step=max_step,
             **options,
         )
         if solution.status < 0:

@@ -37,7 +37,10 @@ class Rule:
     Attributes:
         force_until: Samples of the force from the grasp until then.
         held: Pictures of the drawn band.
-        recoil: Pictures of the recoil until then: in later ones a slack band swings about.
+        recoil: Pictures of the recoil until then, which a camera of 30 Hz has one of: the later, the
+            more of what a law gets wrong has added up.
+        latest: Where there is none, the first one until then: later ones show a slack band that
+            swings about.
         way: Share of the draw by which the band must still be behind the fork in those; where it is
             in none, the first one counts.
         bins: Of the recoil, first and end: nearer the clamps the band folds.
@@ -45,7 +48,8 @@ class Rule:
 
     force_until: float = -0.06
     held: tuple[float, float] = (-0.5, -0.02)
-    recoil: float = 0.05
+    recoil: float = 0.034
+    latest: float = 0.05
     way: float = 0.15
     bins: tuple[int, int] = (4, 12)
 
@@ -55,9 +59,11 @@ class Rule:
         held = (time > self.held[0]) & (time < self.held[1])
         hand = episode.position[episode.time <= episode.release_time][-1:]
         drawn = self.behind(hand)
-        after = np.flatnonzero((time > 0) & (time <= self.recoil))
-        far = [k for k in after if self.behind(episode.clouds[k]) > self.way * drawn]
-        recoil = far or after[np.argsort(time[after])[:1]].tolist()
+        after = np.flatnonzero((time > 0) & (time <= self.latest))
+        first = after[np.argsort(time[after])[:1]]
+        early = after[time[after] <= self.recoil]
+        far = [k for k in early if self.behind(episode.clouds[k]) > self.way * drawn]
+        recoil = far or first.tolist()
         return np.union1d(np.flatnonzero(held), recoil).astype(int)
 
     @staticmethod

@@ -12,9 +12,13 @@ def test_the_table_of_phases_has_the_defaults() -> None:
     assert f"| lead-in | {plan.lead_in:g} s |" in page
     assert f"| approach, grasp | {plan.approach:.2f} m, {plan.finger_time:g} s |" in page
     assert f"| pull | {-plan.draw[0]:.2f} m in 4 s |" in page
-    (dip,) = plan.dips
-    assert dip.out_time == dip.back_time and dip.at == 1
-    assert f"| let back, redraw | {dip.depth:.2f} m, {dip.out_time:g} s each |" in page
+    ways, times = (
+        ", ".join(f"{value:g}" for value in values)
+        for values in ([dip.depth for dip in plan.dips], [dip.out_time for dip in plan.dips])
+    )
+    assert all(dip.out_time == dip.back_time for dip in plan.dips)
+    assert [dip.at for dip in plan.dips] == [0.8, 1, 1]
+    assert f"| let back, redraw | {ways} m in {times} s each |" in page
     assert f"| pause | {plan.pause:g} s |" in page
     assert f"| release, swing | {plan.finger_time + plan.wait:g} s |" in page
     assert f"| retreat | {plan.retreat:.2f} m |" in page

@@ -273,7 +273,7 @@ def test_readme_has_the_results_of_the_report() -> None:
     summary = json.loads((ROOT / "reports/summary.json").read_text(encoding="utf-8"))
     with open(ROOT / "reports/tables/table1.csv", encoding="utf-8", newline="") as file:
         table = list(csv.reader(file))
-    wanted, inside = {}, {"": [0, 0], ", pull with a dip": [0, 0]}
+    wanted, inside = {}, {"": [0, 0], ", pull with dips": [0, 0]}
     for band in ("band1", "band2", "band3"):
         cells = {}
         for pull, counts in inside.items():

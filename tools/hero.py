@@ -161,7 +161,7 @@ def launched(band: str, target: float | None = None) -> list[Frame]:
     target = target or params.trials.targets[1]
     rows = []
     for title, color, name, method in (
-        ("this project, from one pull with a dip", OUR, f"{band}_dip", OURS),
+        ("this project, from one pull with dips", OUR, f"{band}_dip", OURS),
         ("the paper's method, from the paper's pull", THEIR, band, PAPER),
     ):
         trials = pd.read_parquet(made(layout.trials(name, method)))

@@ -1,6 +1,7 @@
 """`python -m validation.exports [--to newton] [BAND...]`: reports/validation/export-<target>.json.
 
-Each band that a run has identified is exported to MuJoCo or Newton and replayed there, on the CPU.
+Each band that a run has identified is exported to MuJoCo or Newton and replayed there, on the CPU;
+or to PhysX, on a GPU.
 """
 
 from __future__ import annotations
@@ -22,10 +23,15 @@ from sling2sim2real.exporting import export
 from sling2sim2real.identification import Identification
 
 REPORTS = Path("reports/validation")
-PACKAGES = {"mjcf": ("mujoco",), "newton": ("newton", "mujoco")}  # the match is MuJoCo's
+PACKAGES = {
+    "mjcf": ("mujoco",),
+    "newton": ("newton", "mujoco"),
+    "usd": (),
+}  # Newton's match: MuJoCo's
 COMMANDS = {
     "mjcf": "python -m validation.exports",
     "newton": "python -m validation.exports --to newton",
+    "usd": "python -m validation.exports --to usd band1_dip band2_dip band3_dip",
 }
 KEPT = (
     "met",
@@ -37,7 +43,11 @@ KEPT = (
     "springs_error",
     "pull",
     "match",
+    "on_paper",
+    "factor_on_youngs_modulus",
+    "factor_on_mass",
 )
+DEVICES = {"usd": "cuda:0"}  # else the CPU
 
 
 def main(target: str, bands: list[str]) -> None:
@@ -48,9 +58,11 @@ def main(target: str, bands: list[str]) -> None:
             model = Identification.of_run(band, params.run.methods[0])
             episode = Episode.load_all(Layout().episodes(band))[0]
             card = export(model, target, folder, episode=episode).card
+        if "met" not in card:
+            raise UserError(f"{target}: its engine or a GPU is missing; nothing was launched there")
         cards[band] = {name: card[name] for name in KEPT if name in card}
         print(f"{band}: {'met' if card['met'] else 'NOT met'}", flush=True)
-    provenance = environment("cpu", COMMANDS[target])
+    provenance = environment(DEVICES.get(target, "cpu"), COMMANDS[target])
     provenance["versions"] |= {name: version(name) for name in PACKAGES[target]}
     met = all(card["met"] for card in cards.values())
     report = REPORTS / f"export-{target}.json"

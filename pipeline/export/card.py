@@ -47,8 +47,8 @@ def content(model: CalibratedBand, done: Matched, target: str, files: dict[str, 
         "engine": done.engine,
         "asked": ASKED,
         "met": done.met,
-        "proof": list(map(_row, done.proof)),
-        "match": list(map(_row, done.match)),
+        "proof": list(map(compared_row, done.proof)),
+        "match": list(map(compared_row, done.match)),
         "pull": {
             name: value if value is None else rounded(value)
             for name, value in asdict(done.pull).items()
@@ -58,7 +58,8 @@ def content(model: CalibratedBand, done: Matched, target: str, files: dict[str, 
     }
 
 
-def _row(compared: DrawCompared) -> dict:
+def compared_row(compared: DrawCompared) -> dict:
+    """A draw as card.json has it: both engines' values and the relative errors."""
     row = {"draw_y_m": rounded(compared.draw[0], 6), "draw_z_m": rounded(compared.draw[1], 6)}
     for name, error in compared.errors.items():
         ours, theirs = getattr(compared, name)

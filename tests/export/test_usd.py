@@ -1,10 +1,13 @@
 """PhysX's USD: valid by usd-core and by PhysX's own schemas; its law on paper."""
 
+import json
+
 import numpy as np
 import pytest
 
-from pipeline.export.usd import nominal
+from pipeline.export.usd import ON_PAPER, nominal
 from sling2sim2real import export
+from tests.project import ROOT
 
 
 @pytest.fixture(scope="module")
@@ -24,8 +27,19 @@ def test_it_says_that_nobody_has_run_it(done) -> None:
     assert done.met is None and done.card["replayed"] is False
     assert "**Match it before you rely on it.**" in (done.folder / "README.md").read_text()
     assert done.card["factor_on_youngs_modulus"] < 1  # its law is stiffer
+    assert done.card["factor_on_mass"] == 1 and "proof" not in done.card
     errors = np.array(done.card["tension_errors"])
     assert errors.min() < 0 < errors.max() and np.abs(errors).max() < 0.25
+
+
+def test_what_it_expects_of_itself_is_what_the_committed_study_saw(done) -> None:
+    study = json.loads((ROOT / "reports/validation/export-usd.json").read_text("utf-8"))
+    rows = [row for band in study["bands"].values() for row in band["on_paper"]]
+    for name, (low, high) in ON_PAPER.items():
+        errors = [row[f"{name}_error"] for row in rows]
+        assert (round(min(errors), 2), round(max(errors), 2)) == (low, high)
+    text = (done.folder / "README.md").read_text()
+    assert f"landed {100 * ON_PAPER['landing'][0]:+.0f} to" in " ".join(text.split())
 
 
 def test_usd_and_the_schemas_of_physx_know_all_that_is_in_it(done) -> None:
@@ -54,10 +68,16 @@ def test_usd_and_the_schemas_of_physx_know_all_that_is_in_it(done) -> None:
     )
     corners = points[tets]
     assert (np.linalg.det(corners[:, 1:] - corners[:, :1]) > 0).all()
-    for side, x in (("Left", -0.1375), ("Right", 0.1375)):
-        hold = stage.GetPrimAtPath(f"/World/Hold{side}")
-        vertices = hold.GetAttribute("omniphysics:vtxIndicesSrc0").Get()
-        offsets = np.array(hold.GetAttribute("omniphysics:localPositionsSrc1").Get())
-        assert points[list(vertices)] - offsets == pytest.approx(
-            np.tile([x, 0, 0], (len(offsets), 1)), abs=1e-6
-        )
+    rest = stage.GetPrimAtPath("/World/Band").GetAttribute("omniphysics:restShapePoints").Get()
+    assert points == pytest.approx(np.array(rest))  # bent ones collapse in PhysX
+
+
+def test_its_nodes_hang_between_the_clamps(done) -> None:
+    nodes = json.loads((done.folder / "nodes.json").read_text("utf-8"))
+    places, count = np.array(nodes["hanging_m"]), len(nodes["hand"])
+    assert len(nodes["ends"]) == 4 * count
+    tips = places[nodes["ends"]].reshape(4, count, 3).mean(axis=1)[1:3]
+    assert tips == pytest.approx(np.array([[-0.1375, 0, 0], [0.1375, 0, 0]]), abs=1e-3)
+    assert places[nodes["hand"]].mean(axis=0) == pytest.approx(
+        [0, 0, places[:, 2].min()], abs=0.006
+    )

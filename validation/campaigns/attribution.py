@@ -136,7 +136,7 @@ def recordings(orange: Path | None, pulls=("informative", "paper")) -> list[Band
 
 @contextmanager
 def recoil_of(method: str) -> Iterator[None]:
-    """Within it what a method's name says of the recoil's pictures: less trust, or later ones too."""
+    """Change what the recoil counts, as a method's name says: less trust, or later pictures too."""
     trusted, counted = Tolerances.of, Rule.frames
 
     def doubled(episode: Episode) -> Tolerances:

@@ -288,7 +288,8 @@ def sentence(content: dict) -> str:
         for kind in ("paper, virgin", "paper, virgin, the paper's method")
     )
     text = (
-        f"On {len(bands)} further virtual rubbers, which took part in no choice, by the pull with dips:"
+        f"On {len(bands)} further virtual rubbers, which took part in no choice, by the pull with"
+        " dips:"
         f" predictions are off by {size:.1f} % of the distance in the mean over rubbers"
         f" ({abs(worst):.1f} % at worst), and {inside:.0f} % of the launches land in their 90 %"
         f" intervals, which are {width:.0f} % of the distance wide. By the paper's pull they"

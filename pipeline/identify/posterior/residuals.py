@@ -37,8 +37,8 @@ class Rule:
     Attributes:
         force_until: Samples of the force from the grasp until then.
         held: Pictures of the drawn band.
-        recoil: Pictures of the recoil until then, which a camera of 30 Hz has one of: the later, the
-            more of what a law gets wrong has added up.
+        recoil: Pictures of the recoil until then, of which a camera of 30 Hz has one: the later a
+            picture, the more of what a law gets wrong has added up.
         latest: Where there is none, the first one until then: later ones show a slack band that
             swings about.
         way: Share of the draw by which the band must still be behind the fork in those; where it is

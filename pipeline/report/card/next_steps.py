@@ -26,7 +26,7 @@ EARLY, LATE = (0.75, 0.5), (0.4, 0.15)  # s before the release, between which th
 STILL = 0.01  # still to this share of it
 RECOIL = "elasticity_damping", "air_drag", "turn_damping"  # what only pictures of the recoil show
 PULL = "youngs_modulus", "mooney_share", "relaxation"  # what the force shows
-A_DIP = "Record a pull with a dip (`sling plan` writes it): it shows how the band unloads"
+A_DIP = "Record a pull with dips (`sling plan` writes it): it shows how the band unloads"
 
 
 class Gain(NamedTuple):

@@ -44,7 +44,7 @@ def test_a_dip_is_recommended_where_no_pull_unloads() -> None:
     model, targets, pulls = landing_model(), np.array([1.7, 1.9]), [still(0.0)]
     fixed = next_steps("toy", [], model, targets, pulls, unloaded=False)
     assert fixed[0] == (
-        "Record a pull with a dip (`sling plan` writes it): it shows how the band unloads, which a"
+        "Record a pull with dips (`sling plan` writes it): it shows how the band unloads, which a"
         " launch depends on."
     )
     assert "dip" not in " ".join(next_steps("toy", [], model, targets, pulls))

@@ -1,10 +1,11 @@
-"""Why an exported band holds less in PhysX: its stage changed in one thing at a time.
+"""What an exported band holds in PhysX, its stage or its steps changed in one thing at a time.
 
     python -m validation.engines.physx.causes USD_FOLDER YAML_FOLDER
 
-The folders are what `sling export` writes of the same band. Each variant is drawn to the
-nearest and the farthest draw of the YAML file and held, as in exported.py; `exported` is the stage
-as it is. Writes reports/validation/export-usd-causes.json. Needs a GPU; not run yet.
+The folders are what `sling export` writes of the same band. Each variant is drawn to the nearest
+and the farthest draw of the YAML file and held, as in exported.py; `exported` is the stage as it
+is. Beside the force stands how much of its volume the free band has then: a stage that opens with
+a bent band collapses across. Writes reports/validation/export-usd-causes.json. Needs a GPU.
 """
 
 from __future__ import annotations
@@ -22,86 +23,131 @@ from ruamel.yaml import YAML
 
 from pipeline.base import errors
 from pipeline.base.environment import environment
+from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
+from pipeline.export.usd import UsdBand
 from pipeline.params import load
 from validation.engines.physx.bands import Engine, release
-from validation.engines.physx.exported import ExportedBand, compared
+from validation.engines.physx.exported import Steps, held, read, yielded
 
 REPORT = Path("reports/validation/export-usd-causes.json")
-CLAMPS = re.compile(r'\n    def (?:Xform "Clamp|OmniPhysicsVtxXformAttachment ").*?\n    }\n', re.S)
+ITERATIONS = "physxDeformableBody:solverPositionIterationCount"
+CLAMP = """
+    def Xform "Clamp%(side)s"
+    {
+        double3 xformOp:translate = %(place)s
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+    }
+
+    def OmniPhysicsVtxXformAttachment "Hold%(side)s"
+    {
+        point3f[] omniphysics:localPositionsSrc1 = %(offsets)s
+        rel omniphysics:src0 = </World/Band>
+        rel omniphysics:src1 = </World/Clamp%(side)s>
+        int[] omniphysics:vtxIndicesSrc0 = %(vertices)s
+    }
+"""
 
 
 @dataclass(frozen=True)
-class LedEnds(ExportedBand):
-    """An exported band whose ends are led with the hand, as those of the study, not attached."""
+class Variant:
+    """A stage, the band that it says, and its steps.
 
-    def job(self, place: np.ndarray) -> dict:
-        job, tube = super().job(place), self.tube
-        rows = np.arange(tube.mass.size).reshape(tube.rest.shape[:2])
-        ends = rows[[0, 1, -2, -1]].ravel()
-        there = tube.clamped.reshape(-1, 3)[ends]
-        for phase in (0, 1):
-            targets = job[f"targets_{phase}"]
-            held = np.broadcast_to(there, (len(targets), *there.shape))
-            job[f"targets_{phase}"] = np.concatenate([targets, held], axis=1)
-            job[f"vertices_{phase}"] = np.concatenate([job[f"vertices_{phase}"], ends])
-        return job
+    Attributes:
+        bent: It opens with the band where it hangs, not with the straight one.
+    """
+
+    text: str
+    band: UsdBand
+    steps: Steps = Steps()
+    bent: bool = False
 
 
-def with_property(band: ExportedBand, name: str, value: object) -> ExportedBand:
+def with_property(variant: Variant, name: str, value: object) -> Variant:
     """The stage with a property set to another value. Raises ValueError where it has none."""
-    text, count = re.subn(rf"(\b{re.escape(name)} = ).+", rf"\g<1>{value}", band.text)
+    text, count = re.subn(rf"(\b{re.escape(name)} = ).+", rf"\g<1>{value}", variant.text)
     if not count:
         raise ValueError(f"the stage has no {name}")
-    return replace(band, text=text)
+    return replace(variant, text=text)
 
 
-def with_poisson(band: ExportedBand, poisson: float) -> ExportedBand:
-    changed = with_property(band, "omniphysics:poissonsRatio", poisson)
-    return replace(changed, poisson=poisson)
+def with_poisson(variant: Variant, poisson: float) -> Variant:
+    changed = with_property(variant, "omniphysics:poissonsRatio", poisson)
+    return replace(changed, band=replace(variant.band, poisson=poisson))
 
 
-def with_rate(band: ExportedBand, rate: int) -> ExportedBand:
-    changed = with_property(band, "physxScene:timeStepsPerSecond", rate)
-    return replace(changed, rate=rate)
+def with_rate(variant: Variant, rate: int) -> Variant:
+    changed = with_property(variant, "physxScene:timeStepsPerSecond", rate)
+    return replace(changed, steps=replace(variant.steps, rate=rate))
 
 
-def with_points_at_rest(band: ExportedBand) -> ExportedBand:
-    """The stage opens with the straight band, which the clamps then bend."""
-    rest = re.search(r"restShapePoints = (.+)", band.text)
-    assert rest
-    return with_property(band, "point3f[] points", rest[1])
+def with_mass(variant: Variant, factor: float) -> Variant:
+    tube = replace(variant.band.tube, mass=factor * variant.band.tube.mass)
+    changed = with_property(variant, "omniphysics:mass", f"{tube.mass.sum():.9g}")
+    return replace(changed, band=replace(variant.band, tube=tube))
 
 
-def with_led_ends(band: ExportedBand) -> ExportedBand:
-    return LedEnds(**vars(replace(band, text=CLAMPS.sub("\n", band.text))))
+def opened_bent(variant: Variant) -> Variant:
+    """The stage's `points` are where the band hangs; it is at rest as it was."""
+    places = variant.band.tube.clamped.reshape(-1, 3)
+    changed = with_property(variant, "point3f[] points", _tuples(places))
+    return replace(changed, bent=True)
 
 
-def without_collision(band: ExportedBand) -> ExportedBand:
-    return replace(band, text=band.text.replace('"PhysicsCollisionAPI", ', ""))
+def with_attachments(variant: Variant) -> Variant:
+    """The stage's own clamps hold its ends."""
+    tube, parts = variant.band.tube, []
+    ends = variant.band.ends.reshape(2, -1)
+    for side, tip, vertices in zip(("Left", "Right"), tube.clamped[[1, -2], 0], ends, strict=True):
+        values = {
+            "side": side,
+            "place": _tuples(tip[None])[1:-1],
+            "vertices": vertices.tolist(),
+            "offsets": _tuples(tube.clamped.reshape(-1, 3)[vertices] - tip),
+        }
+        parts.append(CLAMP % values)
+    body = variant.text.rstrip().removesuffix("}")
+    return replace(variant, text=f"{body}{''.join(parts)}}}\n")
 
 
-def with_mass(band: ExportedBand, factor: float) -> ExportedBand:
-    total = factor * band.tube.mass.sum()
-    changed = with_property(band, "omniphysics:mass", f"{total:.9g}")
-    return replace(changed, tube=replace(band.tube, mass=factor * band.tube.mass))
+def _tuples(rows: np.ndarray) -> str:
+    return "[" + ", ".join(f"({', '.join(f'{v:.9g}' for v in row)})" for row in rows) + "]"
 
 
-VARIANTS: dict[str, Callable[[ExportedBand], ExportedBand]] = {
-    "exported": lambda band: band,
-    "ends led, not attached": with_led_ends,
-    "points at rest": with_points_at_rest,
-    "points at rest, ends led": lambda band: with_led_ends(with_points_at_rest(band)),
-    "Poisson's ratio 0.45": partial(with_poisson, poisson=0.45),
+VARIANTS: dict[str, Callable[[Variant], Variant]] = {
+    "exported": lambda variant: variant,
+    "opened bent": opened_bent,
+    "opened bent, ends attached too": lambda variant: with_attachments(opened_bent(variant)),
+    "opened bent, Poisson's ratio 0.30": lambda v: with_poisson(opened_bent(v), 0.30),
+    "opened bent, 256 iterations": lambda v: with_property(opened_bent(v), ITERATIONS, 256),
+    "damping 2 ms": lambda v: with_property(v, "elasticityDamping", 0.002),
     "Poisson's ratio 0.30": partial(with_poisson, poisson=0.30),
-    "256 iterations": lambda band: with_property(
-        band, "physxDeformableBody:solverPositionIterationCount", 256
-    ),
+    "256 iterations": lambda v: with_property(v, ITERATIONS, 256),
     "1,000 steps a second": partial(with_rate, rate=1000),
-    "drawn and held four times as long": partial(replace, times=(1.0, 8.0, 4.0)),
-    "no collision": without_collision,
+    "drawn and held three times as long": lambda v: replace(v, steps=Steps(times=(1.0, 6.0, 3.0))),
     "four times the mass": partial(with_mass, factor=4.0),
 }
+
+
+def measured(engine: Engine, variant: Variant, launches: list[dict], stiffness) -> list[dict]:
+    """Each draw of the calibrated simulation, held by a variant in PhysX."""
+    rows = []
+    for launch in launches:
+        draw, ours = np.array(launch["draw_m"]), launch["hold_force_n"]
+        place = np.append(0.0, yielded(draw[None], np.array([ours]), stiffness)[0])
+        opens = variant.band.tube.clamped if variant.bent else variant.band.tube.rest
+        force, volume = held(engine, variant.text, variant.band, place, variant.steps, opens=opens)
+        sound = bool(np.isfinite(force))
+        rows.append(
+            {
+                "draw_m": draw.tolist(),
+                "hold_force_n": ours,
+                "hold_force_there_n": force if sound else None,
+                "hold_force_error": force / ours - 1 if sound else None,
+                "volume_left": volume if sound else None,
+            }
+        )
+    return rows
 
 
 def main() -> None:
@@ -110,21 +156,28 @@ def main() -> None:
     parser.add_argument("usd", type=Path)
     parser.add_argument("yaml", type=Path)
     requested = parser.parse_args()
-    version = release()
+    version, (text, band) = release(), read(requested.usd)
     name = json.loads((requested.usd / "card.json").read_text("utf-8"))["band"]
-    launches = YAML(typ="safe").load(requested.yaml / f"{name}.yaml")["launches"]
+    if not (numbers := requested.yaml / f"{name}.yaml").exists():
+        raise UserError(f"{numbers}: no such file; `sling export --to yaml` writes it")
+    launches = YAML(typ="safe").load(numbers)["launches"]
     launches.sort(key=lambda launch: np.hypot(*launch["draw_m"]))
-    band, stiffness = ExportedBand.read(requested.usd / f"{name}.usda"), load().setup.arm_stiffness
-    rows = {}
-    with Engine() as engine:
-        for variant, change in VARIANTS.items():
-            rows[variant] = compared(change(band), [launches[0], launches[-1]], stiffness, engine)
-            held = [100 * (row["hold_force_error"] or np.nan) for row in rows[variant]]
-            print(f"{variant}: {held[0]:+.1f} and {held[1]:+.1f} % of the force held", flush=True)
-    content = {"requested": "One change at a time; what it holds beside the calibrated simulation."}
+    stiffness, rows = load().setup.arm_stiffness, {}
+    content = {"asked": "One change at a time; what it holds beside the calibrated simulation."}
     described = environment("cuda:0", "python -m validation.engines.physx.causes USD YAML")
     described["versions"] |= {"ovphysx": version}
-    write_json(REPORT, content | {"band": name, "variants": rows} | described)
+    with Engine() as engine:
+        for variant, change in VARIANTS.items():
+            stage = change(Variant(text, band))
+            rows[variant] = measured(engine, stage, [launches[0], launches[-1]], stiffness)
+            force = [100 * (row["hold_force_error"] or np.nan) for row in rows[variant]]
+            volume = 100 * (rows[variant][0]["volume_left"] or np.nan)
+            print(
+                f"{variant}: {force[0]:+.1f} and {force[1]:+.1f} % of the force held,"
+                f" {volume:.0f} % of the volume",
+                flush=True,
+            )
+            write_json(REPORT, content | {"band": name, "variants": rows} | described)
 
 
 if __name__ == "__main__":

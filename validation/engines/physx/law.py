@@ -52,7 +52,7 @@ def viscous(before: np.ndarray, gradient: np.ndarray, delay, young, poisson) -> 
 def energy(tube: Tube, positions: np.ndarray, young, poisson) -> np.ndarray:
     """Elastic energy of bands at positions (..., sections, V, 3) [J], shape (...)."""
     mu, lam = (np.asarray(modulus)[..., None] for modulus in lame(young, poisson))
-    before, gradient = _gradients(tube, tube.tetrahedra, positions)
+    before, gradient = gradients(tube, tube.tetrahedra, positions)
     off, volume, _ = _strain(gradient)
     density = mu * (off**2).sum(axis=(-2, -1)) + lam / 2 * (volume[..., 0, 0] - 1) ** 2
     return density @ (np.linalg.det(before) / 6)
@@ -75,13 +75,13 @@ def force_on(
     held = np.zeros(tube.rest.shape[:2], bool)
     held[sections] = True
     near = tube.tetrahedra[held.ravel()[tube.tetrahedra].any(axis=1)]
-    before, gradient = _gradients(tube, near, positions)
+    before, gradient = gradients(tube, near, positions)
     inverse = np.linalg.inv(before)
     moduli = [np.asarray(modulus)[..., None] for modulus in (young, poisson)]
     nominal = stress(gradient, *moduli)
     if step is not None:
         earlier, delay = step
-        past = _gradients(tube, near, earlier)[1]
+        past = gradients(tube, near, earlier)[1]
         nominal = nominal + viscous(past, gradient, np.asarray(delay)[..., None], *moduli)
     shares = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
     retained = shares * held.ravel()[near][..., None]
@@ -100,7 +100,7 @@ def _strain(gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return gradient - left @ right, np.linalg.det(gradient)[..., None, None], cofactor
 
 
-def _gradients(tube: Tube, near: np.ndarray, positions: np.ndarray) -> tuple:
+def gradients(tube: Tube, near: np.ndarray, positions: np.ndarray) -> tuple:
     """Edges at rest (T, 3, 3) of tetrahedra `near` (T, 4), and their gradients (..., T, 3, 3)."""
     before, now = (
         np.swapaxes(corners[..., 1:, :] - corners[..., :1, :], -1, -2)

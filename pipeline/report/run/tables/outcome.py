@@ -65,7 +65,7 @@ def _launched(
         yield band, band, [methods[method].trials for method in references]
         for dip in results.dips.values():
             if dip.band == band:
-                yield f"{band}, pull with a dip", band, [dip.trials]
+                yield f"{band}, pull with dips", band, [dip.trials]
 
 
 def _errors(trials: pd.DataFrame) -> LandingErrors | None:

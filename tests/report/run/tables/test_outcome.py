@@ -52,7 +52,7 @@ def test_the_pull_with_a_dip_has_a_row_below_its_band() -> None:
     dip = InformativePull("band1", launches([[0.01, -0.01]] * 3))
     heads, (first, second) = outcome(replace(ran, dips={"band1_dip": dip}), (MAIN, THEIRS), NAMED)
     summary = dict(zip(heads, second, strict=True))
-    assert first[0] == "band1" and second[0] == "band1, pull with a dip"
+    assert first[0] == "band1" and second[0] == "band1, pull with dips"
     assert (summary["ours [cm]"], summary["Sling2Sim2Real [cm]"]) == ("1.0", NONE)
     assert (summary["actuation floor [cm]"], summary["ours / floor"]) == ("1.0", "1.0")
 

@@ -5,60 +5,65 @@ import difflib
 import numpy as np
 import pytest
 
-from pipeline.export import usd
-from pipeline.export.mesh import Tube
-from pipeline.params import load
-from tests.project import DEFAULTS
-from validation.engines import checks
-from validation.engines.physx.causes import VARIANTS
-from validation.engines.physx.exported import ExportedBand
-from validation.simulator.finding import Bench
+from sling2sim2real import Band, Model, Settings, Theta, export
+from validation.engines.physx.causes import VARIANTS, Variant, measured
+from validation.engines.physx.exported import job_of, read
 
-PLACE = np.array([0.0, -0.3, -0.15])
+PLACES = np.array([[0.0, -0.3, -0.15]])
 
 
 @pytest.fixture(scope="module")
-def band(tmp_path_factory) -> ExportedBand:
-    sling = checks.sling_of(checks.solid(Bench(load(DEFAULTS))))
-    path = tmp_path_factory.mktemp("stage") / "band.usda"
-    path.write_text(usd.text(Tube.of(sling, usd.EDGES, usd.GRADING), 2.2e5, 0.47, 2e-3, 0.7))
-    return ExportedBand.read(path)
+def stage(delivered, tmp_path_factory) -> Variant:
+    theta = Theta(2.2e5, 0.47, 2.4e-3, 0.7, 0.6)
+    band = Band(mass=0.023, diameter=0.010, rest_length=0.52, name="toy")
+    model = Model(band, theta, settings=Settings.coarse())
+    return Variant(*read(export(model, "usd", tmp_path_factory.mktemp("stage") / "usd").folder))
 
 
 @pytest.mark.parametrize("name", [name for name in VARIANTS if name != "exported"])
-def test_a_variant_differs_from_the_stage(band, name):
-    other = VARIANTS[name](band)
-    lines = difflib.unified_diff(band.text.splitlines(), other.text.splitlines(), n=0, lineterm="")
+def test_a_variant_differs_from_the_stage_in_what_it_says(stage, name):
+    other = VARIANTS[name](stage)
+    lines = difflib.unified_diff(stage.text.splitlines(), other.text.splitlines(), n=0, lineterm="")
     changed = sum(line.startswith("+") for line in lines) - 1
-    jobs = band.job(PLACE), other.job(PLACE)
-    same = all(np.array_equal(jobs[0][key], jobs[1][key]) for key in jobs[0])
-    if name.startswith(("drawn", "ends led")):
-        assert not same
-    assert changed <= 1 or "ends led" in name
-    assert changed == 1 or not same
+    jobs = [
+        job_of(variant.band, PLACES, np.zeros((1, 3)), variant.steps)["targets_1"]
+        for variant in (stage, other)
+    ]
+    same = np.array_equal(*jobs)
+    if name.startswith("drawn"):
+        assert not same and other.text == stage.text
+    elif "attached" in name:
+        assert "OmniPhysicsVtxXformAttachment" in other.text and same
+    else:
+        assert changed == 1 + (name.count(",") if not name[0].isdigit() else 0)
+    assert other.text.count("{") == other.text.count("}")
+    assert other.bent == name.startswith("opened bent")
 
 
-def test_led_ends_stay_where_the_clamps_hold_them(band):
-    led = VARIANTS["ends led, not attached"](band)
-    assert "Attachment" in band.text and "Attachment" not in led.text and "Clamp" not in led.text
-    assert led.text.count("{") == led.text.count("}")
-    for phase in (0, 1):
-        job = led.job(PLACE)
-        vertices, targets = job[f"vertices_{phase}"], job[f"targets_{phase}"]
-        ends = band.tube.clamped[[0, 1, -2, -1]].reshape(-1, 3)
-        assert targets.shape[1] == len(vertices)
-        assert targets[-1, -len(ends) :] == pytest.approx(ends)
-        assert band.tube.clamped.reshape(-1, 3)[vertices[-len(ends) :]] == pytest.approx(ends)
-
-
-def test_what_a_variant_says_of_itself_is_in_its_stage(band):
-    assert "poissonsRatio = 0.45" in VARIANTS["Poisson's ratio 0.45"](band).text
-    fast = VARIANTS["1,000 steps a second"](band)
-    assert fast.rate == 1000 and len(fast.job(PLACE)["targets_1"]) == 3000
-    assert "solverPositionIterationCount = 256" in VARIANTS["256 iterations"](band).text
-    assert VARIANTS["four times the mass"](band).tube.mass.sum() == pytest.approx(
-        4 * band.tube.mass.sum()
+def test_what_a_variant_says_of_itself_is_in_its_stage(stage):
+    assert "poissonsRatio = 0.3\n" in VARIANTS["Poisson's ratio 0.30"](stage).text
+    fast = VARIANTS["1,000 steps a second"](stage)
+    assert fast.steps.rate == 1000 and "timeStepsPerSecond = 1000" in fast.text
+    assert "solverPositionIterationCount = 256" in VARIANTS["256 iterations"](stage).text
+    assert "elasticityDamping = 0.002" in VARIANTS["damping 2 ms"](stage).text
+    assert VARIANTS["four times the mass"](stage).band.tube.mass.sum() == pytest.approx(
+        4 * stage.band.tube.mass.sum()
     )
-    straight = VARIANTS["points at rest"](band).text
-    points = [line.split(" = ")[1] for line in straight.splitlines() if "points = " in line.lower()]
-    assert len(set(points)) == 1 and len(points) == 3
+    bent = VARIANTS["opened bent"](stage).text
+    points = [line.split(" = ")[1] for line in bent.splitlines() if "points = " in line.lower()]
+    assert len(points) == 3 and len(set(points)) == 2
+
+
+def test_a_row_has_force_and_volume_beside_ours(stage):
+    class Halved:
+        """What it holds is the band as it opens, half as thick across."""
+
+        def run(self, text: str, job: dict) -> dict:
+            assert job["rest"] == pytest.approx(stage.band.tube.clamped.reshape(-1, 3))
+            half = stage.band.tube.rest * [1.0, np.sqrt(0.5), np.sqrt(0.5)]
+            return {"positions_1": half.reshape(1, 1, -1, 3)}
+
+    launch = {"draw_m": [-0.3, -0.15], "hold_force_n": 8.0}
+    (row,) = measured(Halved(), VARIANTS["opened bent"](stage), [launch], None)
+    assert row["volume_left"] == pytest.approx(0.5) and row["hold_force_n"] == 8.0
+    assert row["hold_force_error"] == pytest.approx(row["hold_force_there_n"] / 8.0 - 1)

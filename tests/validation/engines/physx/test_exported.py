@@ -4,78 +4,91 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.export import usd
-from pipeline.export.mesh import Tube
-from pipeline.params import load
+from pipeline.export.replay import Shot
 from pipeline.simulator.cylinder import volumes
-from pipeline.simulator.model import GRAVITY
-from tests.project import DEFAULTS
-from validation.engines import checks
-from validation.engines.physx import law
-from validation.engines.physx.exported import LIMIT, SLIP, ExportedBand, compared, met, yielded
-from validation.simulator.finding import Bench
+from sling2sim2real import Band, Model, Settings, Theta, export
+from tests.validation.engines.physx import strings
+from tests.validation.engines.physx.strings import StringEngine
+from validation.engines.physx import flight, law
+from validation.engines.physx.exported import Steps, held, job_of, launched, read, yielded
 
-YOUNG, POISSON = 2.2e5, 0.45
 STRETCH, ACROSS = 1.6, 0.8
+DRAWS = np.array([[-0.30, -0.20], [-0.35, -0.15]])
 
 
 @pytest.fixture(scope="module")
-def tube():
-    sling = checks.sling_of(checks.solid(Bench(load(DEFAULTS))))
-    return Tube.of(sling, usd.EDGES, usd.GRADING)
+def model(delivered) -> Model:
+    theta = Theta(1.8e5, 0.47, 2.4e-3, 0.7, 0.6)
+    band = Band(mass=0.023, diameter=0.010, rest_length=0.52, name="toy")
+    return Model(band, theta, settings=Settings.coarse())
 
 
-@pytest.fixture
-def stage(tube, tmp_path):
-    path = tmp_path / "band.usda"
-    path.write_text(usd.text(tube, YOUNG, POISSON, 2e-3, 0.7))
-    return path
+@pytest.fixture(scope="module")
+def folder(model, tmp_path_factory):
+    return export(model, "usd", tmp_path_factory.mktemp("stage") / "usd").folder
 
 
 class OneHalfStretched:
     """An engine whose band lies along x, thinner by one ratio, one half of it stretched."""
 
-    def __init__(self, tube, slip: float = 0.0) -> None:
-        self.tube, self.slip = tube, slip
+    def __init__(self, tube) -> None:
+        self.tube = tube
 
     def run(self, text: str, job: dict) -> dict:
         tube = self.tube
         out = tube.rest * [1.0, ACROSS, ACROSS]
         middle = tube.rest[tube.middle, 0, 0]
         out[..., 0] = middle + np.where(out[..., 0] < middle, STRETCH, 1.0) * (out[..., 0] - middle)
-        ends = [0, 1, -2, -1]
-        out[ends] = tube.clamped[ends] + [0.0, 0.0, self.slip]
         return {"positions_1": out.reshape(1, 1, -1, 3)}
 
 
-def test_the_stage_is_read_as_it_was_written(tube, stage):
-    band = ExportedBand.read(stage)
-    assert (band.young, band.poisson, band.rate) == (YOUNG, POISSON, usd.RATE)
-    assert band.tube.rest == pytest.approx(tube.rest, abs=1e-8)
-    assert band.tube.clamped == pytest.approx(tube.clamped, abs=1e-8)
-    assert (band.tube.tetrahedra == tube.tetrahedra).all() and band.tube.middle == tube.middle
-    assert band.tube.mass == pytest.approx(tube.mass, rel=1e-6)
+def test_the_stage_is_read_as_it_was_written(model, folder):
+    text, band = read(folder)
+    card_young = float(text.split("youngsModulus = ")[1].split()[0])
+    assert band.young == card_young and band.poisson == 0.47 and band.friction == 0.7
+    tube = band.tube
+    assert tube.mass.sum() == pytest.approx(0.023 * 0.55 / 0.52, rel=1e-6)  # with what is clamped
+    assert volumes(tube.rest, tube.tetrahedra).min() > 0
+    assert tube.clamped[[1, -2]].mean(axis=1) == pytest.approx(model.sling.tips, abs=1e-8)
 
 
-def test_what_is_no_export_is_refused_in_a_line(stage, tmp_path):
+def test_what_is_no_export_is_refused_in_a_line(model, tmp_path):
+    folder = export(model, "usd", tmp_path / "usd").folder
+    stage = folder / "toy.usda"
     stage.write_text(stage.read_text().replace("restShapePoints", "shape"))
     with pytest.raises(UserError, match="has no point3f.. omniphysics:restShapePoints"):
-        ExportedBand.read(stage)
+        read(folder)
     with pytest.raises(UserError, match="No such file"):
-        ExportedBand.read(tmp_path / "none.usda")
+        read(tmp_path / "none")
 
 
-def test_the_force_on_the_hand_is_what_the_stretched_half_pulls_more(tube, stage):
-    force, gone = ExportedBand.read(stage).held(OneHalfStretched(tube), np.array([0.0, -0.38, 0.0]))
+def test_ends_and_hand_are_led_where_they_belong(folder):
+    band = read(folder)[1]
+    places = np.array([[0.0, -0.3, -0.15], [0.0, -0.35, -0.1]])
+    job = job_of(band, places, np.zeros((2, 3)), Steps(rate=100, times=(0.1, 0.4, 0.2)))
+    assert len(job["keep_0"]) == 10 and len(job["keep_1"]) == len(job["targets_1"]) == 60
+    last, ends = job["targets_1"][-1], len(band.ends)
+    flat = band.tube.clamped.reshape(-1, 3)
+    assert last[:, :ends] == pytest.approx(np.tile(flat[band.ends], (2, 1, 1)))
+    assert last[:, ends:].mean(axis=1) == pytest.approx(places)
+    assert job["start"][0] == pytest.approx(flat)
+    assert job["rest"] == pytest.approx(band.tube.rest.reshape(-1, 3))
+    assert job["keep_1"].sum() == 1 and job["keep_1"][-1]
+
+
+def test_the_force_on_the_hand_is_what_the_stretched_half_pulls_more(folder):
+    text, band = read(folder)
+    tube = band.tube
+    force, volume = held(OneHalfStretched(tube), text, band, np.array([0.0, -0.38, 0.0]))
     pulls = [
-        law.stress(np.diag([along, ACROSS, ACROSS]), YOUNG, POISSON)[0, 0] for along in (STRETCH, 1)
+        law.stress(np.diag([along, ACROSS, ACROSS]), band.young, band.poisson)[0, 0]
+        for along in (STRETCH, 1)
     ]
     near = tube.middle + 1
     length = np.ptp(tube.rest[[tube.middle, near], 0, 0])
     section = volumes(tube.rest[tube.middle : near + 1], _of_one_layer(tube)).sum() / length
-    weight = tube.mass.reshape(tube.rest.shape[:2])[tube.middle].sum() * GRAVITY
-    assert force == pytest.approx(np.hypot(section * (pulls[0] - pulls[1]), weight), rel=1e-5)
-    assert gone == pytest.approx(0, abs=1e-9)
+    assert force == pytest.approx(section * (pulls[0] - pulls[1]), rel=1e-5)
+    assert volume == pytest.approx(ACROSS**2 * (STRETCH + 1) / 2, rel=1e-3)
 
 
 def _of_one_layer(tube) -> np.ndarray:
@@ -86,19 +99,22 @@ def _of_one_layer(tube) -> np.ndarray:
     return tube.tetrahedra[inside.all(axis=1)] - first
 
 
-def test_limits_count(tube, stage):
-    band = ExportedBand.read(stage)
-    draw = [-0.38, 0.0]
-    force, _ = band.held(OneHalfStretched(tube), np.array([0.0, *draw]))
-
-    def rows(share: float, slip: float = 0.0) -> list[dict]:
-        launches = [{"draw_m": draw, "hold_force_n": force * share}]
-        return compared(band, launches, None, OneHalfStretched(tube, slip))
-
-    assert met(rows(1.0)) and met(rows(1 - 0.9 * LIMIT))
-    assert not met(rows(1 - 1.2 * LIMIT)) and not met(rows(1.0, 2 * SLIP)) and not met([])
+def test_bands_that_are_launched_together_land_as_one_by_one(model, folder, monkeypatch):
+    monkeypatch.setattr(flight, "force_on", strings.force_on)
+    monkeypatch.setattr(flight, "energy", strings.energy)
+    text, band = read(folder)
+    engine, rest = StringEngine(band.tube), (model.sling, model.launch_setup)
+    both = launched(engine, text, band, *rest, DRAWS, youngs=np.array([1.0, 1.2]) * band.young)
+    (single,) = launched(engine, text, band, *rest, DRAWS[:1])
+    assert isinstance(single, Shot) and both[0] == single
+    (other,) = launched(engine, text, band, *rest, DRAWS[1:])
+    assert both[1].landing > 1.1 * other.landing > 0
+    assert both[1].hold_force == pytest.approx(1.2 * other.hold_force)
 
 
 def test_an_arm_gives_way_towards_the_fork():
-    assert yielded(np.array([-0.4, 0.0]), 12.0, 12_000.0) == pytest.approx([0.0, -0.399, 0.0])
-    assert yielded(np.array([-0.3, -0.2]), 12.0, None) == pytest.approx([0.0, -0.3, -0.2])
+    draws, force = np.array([[-0.4, 0.0], [-0.3, -0.4]]), np.array([12.0, 24.0])
+    assert yielded(draws, force, 12_000.0) == pytest.approx(
+        np.array([[-0.399, 0.0], [-0.2988, -0.3984]])
+    )
+    assert yielded(draws, force, None) == pytest.approx(draws)

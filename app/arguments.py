@@ -170,7 +170,7 @@ def finite(value: float) -> float | None:
 
 
 def address(text: str) -> str:
-    """Of a Dask scheduler."""
+    """Check that an argument is the address of a Dask scheduler."""
     if not re.fullmatch(r"(\w+://)?(\[.+\]|[^:/\s]+):\d{1,5}", text):
         raise argparse.ArgumentTypeError(f"must be such as tcp://10.0.0.5:8786, got {text!r}")
     return text

@@ -106,7 +106,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def say(text: str) -> None:
-    """On stderr: stdout is for the answer."""
+    """Print a message on stderr: stdout is for the answer."""
     print(text, file=sys.stderr, flush=True)
 
 

@@ -86,7 +86,7 @@ def interval_90(
 
 
 def _samples(theta: Path, content: dict, root: Path) -> Parameters | None:
-    """Of a run's θ file; None of any other, and where the method has none."""
+    """Samples of a run's θ file; None of any other, and where the method has none."""
     at = owner(theta)
     if not (at and at[2]):
         return None

@@ -198,7 +198,7 @@ def prediction_of(
 
 
 def policy_stage(params: Params, band: str, method: str) -> str:
-    """Of dvc.yaml. Raises UserError where params.yaml runs the method on no such band."""
+    """Stage of dvc.yaml. Raises UserError where params.yaml runs the method on no such band."""
     if stage := stage_of(params, "policy", band, method):
         return stage
     raise UserError(f"{method} does not run on {band}: see `run:` in params.yaml, or --no-run")

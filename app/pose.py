@@ -27,7 +27,7 @@ from stages.start import stage_of
 
 
 class PosedAnswer(Answer):
-    """With the hand's pose for the draw: None, with a warning, where the fork is unknown."""
+    """Answer with the hand's pose for the draw: None, with a warning, where the fork is unknown."""
 
     pitch_rad: float  # of the launch, above the horizon
     tcp_frame: str | None  # the robot's base

@@ -38,7 +38,7 @@ class Hazard:
 
 
 def tell(hazards: Iterable[Hazard]) -> None:
-    """On stderr, a line each."""
+    """Print hazards on stderr, a line each."""
     for hazard in hazards:
         print(f"warning: {hazard.what}", file=sys.stderr)
 

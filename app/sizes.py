@@ -15,7 +15,7 @@ def band_to_come(
     diameter: float | None = None,
     rest_length: float | None = None,
 ) -> BandParams:
-    """With common values for what is None. Raises UserError where it does not reach the tips."""
+    """Band with common values for None. Raises UserError where it does not reach the tips."""
     band = BandParams(
         source="recording",
         mass=mass or MASS,

@@ -273,7 +273,7 @@ def _evaluator(episode: Episode, sling: ClampedBand, settings: Settings) -> Eval
 
 
 def _intervals(content: dict, summary: dict) -> dict[str, Interval]:
-    """Of a θ file's content and its confidence."""
+    """Intervals by name, from a θ file's content and its confidence."""
     result = {}
     for name, parameter in summary["parameters"].items():
         value, unit = content["theta"][name], SI_UNITS.get(name, "")

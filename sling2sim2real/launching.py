@@ -154,7 +154,7 @@ def aim(model: Model, target: float) -> Aim:
 
 
 def _gentlest(model: Model, target: float) -> np.ndarray:
-    """Of draws that the map lands on the target that of least force, (2,). Raises UserError."""
+    """Draw of least force, (2,), of those that the map lands on the target. Raises UserError."""
     surface = model.landing_map
     grid, landing = landings_within(surface, FINE)
     off = landing - target

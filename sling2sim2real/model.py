@@ -120,12 +120,12 @@ class Theta:
 
     @property
     def law(self) -> str:
-        """Of the material: neo_hookean or rubber."""
+        """Law of the material: neo_hookean or rubber."""
         return RUBBER if any(getattr(self, name) is not None for name in ADDED) else NEO_HOOKEAN
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of what `point` holds."""
+        """Names of what `point` holds."""
         return names_of(self.law)
 
     @property
@@ -135,12 +135,12 @@ class Theta:
 
     @property
     def parameters(self) -> Parameters:
-        """As the simulator takes it, one sample."""
+        """Parameters as the simulator takes them, one sample."""
         return Parameters.named(self.law, {name: getattr(self, name) for name in self.names})
 
     @classmethod
     def of(cls, names: Sequence[str], point: np.ndarray) -> Theta:
-        """Of a vector (P,) by its names; the inverse of `point`."""
+        """Make θ from a vector (P,) by its names; the inverse of `point`."""
         return cls(**dict(zip(names, np.asarray(point, float).tolist(), strict=True)))
 
     def content(self, band: str, history: LaunchHistory | None = None) -> dict:
@@ -160,12 +160,12 @@ class Theta:
 
     @classmethod
     def load(cls, path: str | Path) -> Theta:
-        """From a θ file, which a run or a person wrote. Raises UserError."""
+        """Read θ from a θ file, which a run or a person wrote. Raises UserError."""
         return cls.of_file(read_json(Path(path), ThetaFile))
 
     @classmethod
     def of_file(cls, file: ThetaFile) -> Theta:
-        """From a θ file's content, checked."""
+        """Make θ from a θ file's content, checked."""
         return cls(**parameters_of(file.model_dump(exclude_unset=True)).sample())
 
 

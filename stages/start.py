@@ -32,7 +32,7 @@ GRACE = 5.0  # s from the interrupt to the end
 
 
 def arguments(*names: str) -> list[str]:
-    """As many arguments as `names` (band, method); anything else prints the usage and exits 2."""
+    """Return as many arguments as `names` (band, method); else print the usage and exit with 2."""
     given = sys.argv[1:]
     if len(given) != len(names) or any(argument.startswith("-") for argument in given):
         script = f"stages.{Path(sys.argv[0]).stem}"
@@ -97,7 +97,7 @@ def _end_with_dvc() -> None:
 
 
 def remedy(error: NotMade) -> str:
-    """In words how a user gets a file, or gets it anew; "" where no stage makes it."""
+    """Describe how a user gets a file, or gets it anew; "" where no stage makes it."""
     owner_of_path = owner(error.path)
     if owner_of_path is None:
         return ""

@@ -39,7 +39,7 @@ def box(file: str) -> str:
 
 
 def arrows() -> list[tuple[str, str]]:
-    """Who imports whom, sorted: the transitive reduction of all imports."""
+    """List who imports whom, sorted: the transitive reduction of all imports."""
     graph = networkx.DiGraph()
     for file in sorted(file for top in CODE for file in (ROOT / top).rglob("*.py")):
         if file == ROOT / DEVELOPERS:

@@ -69,7 +69,7 @@ class LaunchRow:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Of 90 % of the landings [m]."""
+        """Predicted interval of 90 % of the landings [m]."""
         first = self.trials.iloc[0]
         return first.predicted_low, first.predicted_high
 

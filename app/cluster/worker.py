@@ -49,7 +49,7 @@ def introduce(token: str) -> tuple[bool, dict[str, str]]:
 
 
 def versions() -> dict[str, str]:
-    """Of Python and of every package that is installed, by name in lower case."""
+    """Versions of Python and of every package that is installed, by name in lower case."""
     installed = {
         distribution.name.lower(): distribution.version
         for distribution in distributions()
@@ -111,7 +111,7 @@ def work(order: Order, topic: str) -> tuple[bool, dict | None]:
 
 
 def environment(threads: int) -> dict[str, str]:
-    """Of a stage: the worker's own, with an equal share of its cores. Raises UserError.
+    """Environment of a stage: the worker's own, with an equal share of its cores. Raises UserError.
 
     Args:
         threads: Stages that the worker runs at a time. SLING_WORKERS, where set, is the share.

@@ -75,5 +75,5 @@ def changes(values: Mapping[str, Sequence[ValueOfRecording]]) -> list[ChangeOfBa
 
 
 def newest(changed: Sequence[ChangeOfBand]) -> int:
-    """From which recording on none differs from another; 0 where none changed at all."""
+    """Number of the first recording from which on none differs; 0 where none changed at all."""
     return max((change.earlier + 1 for change in changed), default=0)

@@ -1,4 +1,4 @@
-"""Each recording of a band identified alone, and their order in time."""
+"""Identify each recording of a band alone, and put them in order in time."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class IdentifiedRecording(JsonRecord):
 
 
 class KeptRecordings(JsonRecord):
-    """Of a drift.json, what the next one may take over."""
+    """Recordings of a drift.json, which the next one may take over."""
 
     recordings: list[IdentifiedRecording]
 
@@ -63,7 +63,7 @@ class KeptRecordings(JsonRecord):
 def identified(
     files: Sequence[Path], band: Band, settings: Settings, code: dict[str, str], retained: Path
 ) -> list[IdentifiedRecording]:
-    """Each file identified alone, by its own mounting, exploration and nuisances.
+    """Identify each file alone, by its own mounting, exploration and nuisances.
 
     Args:
         code: Digests of the code that does it.
@@ -106,7 +106,7 @@ def _alone(file: Path, key: str, band: Band, settings: Settings) -> IdentifiedRe
 
 
 def values_of(identification: Identification) -> dict[str, ValueOfRecording]:
-    """Of COMPARED, by name."""
+    """Values of the quantities COMPARED, by name."""
     assert identification.samples is not None  # a fit draws them
     columns = dict(zip(identification.theta.names, identification.samples.T, strict=True))
     columns["damping_product"] = columns["elasticity_damping"] * columns["damping_scale"]
@@ -122,7 +122,7 @@ def values_of(identification: Identification) -> dict[str, ValueOfRecording]:
 
 
 def in_time(recordings: Sequence[IdentifiedRecording]) -> list[IdentifiedRecording] | None:
-    """By their stamps; None where those are no wall clock's.
+    """Order recordings by their stamps; None where those are no wall clock's.
 
     A simulation's clock begins at 0, or each time anew: then recordings are of the same time.
     """

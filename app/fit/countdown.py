@@ -23,7 +23,7 @@ class Countdown:
     """Lines on stderr, a stage each; on a terminal the last one tells of the work in it."""
 
     def __init__(self, stages: Sequence[Stage]) -> None:
-        """Of the stages that may run, in order."""
+        """Start the clock for the stages that may run, in order."""
         self.stages = {stage.name: stage.description for stage in stages}
         self.start = self.begun = time.monotonic()
         self.worth = 0.0  # of the stages that have run, in seconds of SECONDS

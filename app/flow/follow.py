@@ -200,7 +200,7 @@ class Log:
         await models.task_runs.set_task_run_state(session, task.id, running, force=True)
 
     async def _end(self, session: Any, event: dict) -> None:
-        """Of a stage, or of the run with all that is still at work."""
+        """Set the end of a stage, or of the run with all that is still at work."""
         payload = *STATES[event["state"]], event["at"], event["message"]
         for stage in [event["stage"]] if "stage" in event else self.open:
             task = self._task(stage)

@@ -186,7 +186,7 @@ class Seen:
 
 
 def _stages(index) -> dict[str, Stage]:
-    """In the order of Graph.stages."""
+    """Runnable stages by name, in the order of Graph.stages."""
     import networkx
 
     graph = index.graph  # from consumers to producers; makes of `dvc add` are nodes too

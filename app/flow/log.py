@@ -39,7 +39,7 @@ class RunLog:
     """
 
     def __init__(self, root: Path, command: str, stages: Iterable[str]) -> None:
-        """Of what runs: a command, and the stages by whose bands and methods a run is named."""
+        """Prepare the log of a command; the bands and methods of `stages` name the run."""
         self.root, self._lock, self._failed = Path(root), Lock(), False
         self._file: FileIO | None = None
         self._ran: list[str] = []

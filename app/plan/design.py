@@ -44,7 +44,7 @@ class DesignedPull:
     tried: int
 
     def content(self) -> dict:
-        """For JSON."""
+        """Return the design for JSON."""
         return {
             "targets_m": self.targets.tolist(),
             "half_width_m": {name: row.tolist() for name, row in self.half_widths.items()},
@@ -179,7 +179,7 @@ def _path(design: PullDesign, dips: Sequence[Dip]) -> tuple[np.ndarray, np.ndarr
 
 
 def as_yaml(dips: Sequence[Dip]) -> str:
-    """As params.yaml has them."""
+    """Write dips in the form of params.yaml."""
     if not dips:
         return "  dips: []"
     rows = [

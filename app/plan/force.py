@@ -99,7 +99,7 @@ class Held:
         return self.legs(point)[0]
 
     def force(self, point: np.ndarray) -> float:
-        """Of the band on the hand at a point (3,), in units of a third of E A; 0 where slack."""
+        """Band's force on the hand at a point (3,), in units of a third of E A; 0 where slack."""
         stretch, both = self.legs(point)
         return max(stretch - stretch**-2, 0.0) * both
 

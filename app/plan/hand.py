@@ -18,5 +18,5 @@ def along_pull(drawn: np.ndarray) -> Rotation:
 
 
 def quaternion(rotation: Rotation) -> np.ndarray:
-    """As x, y, z, w with w not negative."""
+    """Quaternion x, y, z, w of a rotation, with w not negative."""
     return rotation.as_quat(canonical=True)

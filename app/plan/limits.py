@@ -63,7 +63,7 @@ def check_hand(plan: PlanParams, band: BandParams, axis: np.ndarray, drawn: np.n
 
 
 def check_dips(plan: PlanParams) -> None:
-    """Each dip stays between the fork and the draw."""
+    """Check that each dip stays between the fork and the draw."""
     size = math.hypot(*plan.draw)
     for number, dip in enumerate(plan.dips):
         if dip.depth >= dip.at * size:

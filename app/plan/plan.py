@@ -349,7 +349,7 @@ def _standing(
 
 
 def _orientation(given: tuple[float, ...] | None, base: Transform, drawn: np.ndarray) -> Rotation:
-    """Of the hand in the base: as given, else looking along the pull at the fork."""
+    """Orientation of the hand in the base: as given, else looking along the pull at the fork."""
     return base.rotation * along_pull(drawn) if given is None else Rotation.from_quat(given)
 
 

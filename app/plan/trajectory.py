@@ -77,7 +77,7 @@ class Trajectory:
         return float(self.times[-1])
 
     def start_of(self, name: str) -> float:
-        """When the phase of that name begins [s]. Raises KeyError."""
+        """Time at which the phase of that name begins [s]. Raises KeyError."""
         for phase, time in zip(self.phases, self.times, strict=False):
             if phase.name == name:
                 return float(time)

@@ -69,7 +69,7 @@ def look_at(
     source: str = "given",
     pull: int | None = None,
 ) -> Look:
-    """As `check_recording`, with what it was made from.
+    """Do what `check_recording` does, and return the report with what it was made from.
 
     Args:
         source: Where `band` is from.

@@ -82,7 +82,7 @@ class MotionPhase:
 
     @classmethod
     def of(cls, phase: InteractionPhase, start: float) -> MotionPhase:
-        """Of a phase of a window that begins at `start` [s]."""
+        """Motion phase from a phase of a window that begins at `start` [s]."""
         times = start + phase.begin, start + phase.end
         return cls(phase.kind, *times, phase.start, phase.stop, phase.speed)
 
@@ -104,7 +104,7 @@ class DelayFacts:
 
     @classmethod
     def of(cls, delays: Delays) -> dict[str, DelayFacts]:
-        """By what is late."""
+        """Facts by the name of what is late: pose and camera."""
         return {
             role: cls(
                 None if delay.error is None else delay.value,

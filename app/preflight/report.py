@@ -145,7 +145,7 @@ class CheckReport:
         return "can be used, but:" if self.cautions else "can be used"
 
     def to_json(self, frames: bool = False) -> str:
-        """As one object; `frames` adds `coverage`, a row for each picture."""
+        """Write the report as one object; `frames` adds `coverage`, a row for each picture."""
         content = {**asdict(self), "usable": self.usable, "verdict": self.verdict}
         content["cautions"] = [caution.content() for caution in self.cautions]
         content |= {name: content[name] or {} for name in ("signals", "cloud", "extrinsics")}
@@ -202,7 +202,7 @@ class CheckReport:
 
 
 def _motion(phases: list[MotionPhase]) -> str:
-    """In the order of time; of many, the first and the last ones."""
+    """List phases in the order of time; of many, the first and the last ones."""
     text = list(map(str, phases))
     if len(text) > MOST_PHASES:
         left = len(text) - MOST_PHASES

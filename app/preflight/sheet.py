@@ -90,7 +90,7 @@ def masked_frames(
 
 
 def moments(scene: Scene) -> dict[str, float]:
-    """When to look, by MOMENTS: seconds since the window's start."""
+    """Times to look at, by MOMENTS: seconds since the window's start."""
     signals = scene.signals
     grasp, release = signals.grasp_time, signals.release_time
     times = np.linspace(grasp, release, 500)[:-1]
@@ -176,7 +176,7 @@ def _cloud(axes: Axes, done: Processed, moment: Moment, a: int, b: int, labels: 
 
 
 def _force(axes: Axes, done: Processed, facts: SignalSummary) -> None:
-    """Each component and its size: seconds since the recording's first force."""
+    """Draw each component of the force and its size: seconds since the recording's first force."""
     signals, start = done.signals, facts.window_start_s
     time = start + signals.time
     for axis, values, color in zip("xyz", signals.force.T, COLORS, strict=False):

@@ -101,7 +101,7 @@ def digests(*scripts: Path, root: Path = ROOT) -> dict[str, str]:
 
 
 def digest(part: Path) -> str | None:
-    """Of a file, or of a folder with all below it; None where there is none of that name."""
+    """Digest of a file, or of a folder with all below it; None where there is none of that name."""
     if not part.exists():
         return None
     if part.is_file():

@@ -44,7 +44,7 @@ def refused(error: OSError) -> str | None:
 
 
 def _whose(path: str) -> str:
-    """To whom the file belongs, or the folder that is to hold it, where that is another user."""
+    """Name the owner of the file, or of the folder to hold it, where that is another user."""
     there = os.path.abspath(path)
     while not os.path.lexists(there):
         there = os.path.dirname(there)

@@ -12,5 +12,5 @@ FOOT = "hits the fork: too low where it passes"
 
 
 def too_strong(force: float, limit: float) -> str:
-    """That the arm may not hold the drawn band [N]."""
+    """Message that the arm may not hold the drawn band [N]."""
     return f"holding takes {force:.1f} N, more than {limit:g} N"

@@ -21,7 +21,7 @@ LIMIT = Path("/sys/fs/cgroup/cpu.max")
 
 
 def devices() -> tuple[str, ...]:
-    """Those of SLING_DEVICE, each by its own name. Raises UserError."""
+    """Devices that SLING_DEVICE names, each by its own name. Raises UserError."""
     return named(os.environ.get("SLING_DEVICE") or "cpu", "SLING_DEVICE")
 
 

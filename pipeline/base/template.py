@@ -22,7 +22,7 @@ def filled(path: Path, /, **values: object) -> str:
 
 @cache
 def _environment(folder: Path) -> Environment:
-    """Of plain text, in which a line that is a statement alone leaves nothing."""
+    """Environment of plain text, in which a line that is a statement alone leaves nothing."""
     return Environment(
         loader=FileSystemLoader(folder),
         undefined=StrictUndefined,

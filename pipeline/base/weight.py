@@ -12,5 +12,5 @@ LONGEST = 12.0  # stretch up to which a law is asked
 
 
 def tension(strands: int) -> float:
-    """Of each strand [N]; the band's own weight is a hundredth of it, and left out."""
+    """Tension of each strand [N]; the band's own weight is a hundredth of it, and left out."""
     return WEIGHT * 9.81 / strands

@@ -82,7 +82,7 @@ class InteractionPhase:
 
     @property
     def speed(self) -> float:
-        """In the mean [m/s]."""
+        """Mean speed [m/s]."""
         return self.way / max(self.duration, 1e-9)
 
 
@@ -102,7 +102,7 @@ def phases(episode: Episode) -> list[InteractionPhase]:
 
 
 def phases_of_hand(held: HandSignals) -> list[InteractionPhase]:
-    """From grasp to release, by time."""
+    """Phases from grasp to release, by time."""
     taut = taut_samples(held)
     if not taut.any():
         return []
@@ -137,7 +137,7 @@ SLACK, RESTS = -2, -1  # beside the numbers of ways
 
 
 def _names(time: np.ndarray, drawn: np.ndarray, slack: float) -> np.ndarray:
-    """Of each sample (T,): which of the hand's ways it belongs to, RESTS or SLACK."""
+    """Names of samples, (T,): which of the hand's ways each belongs to, RESTS or SLACK."""
     names = np.searchsorted(turns(drawn)[1:-1], np.arange(len(drawn)), side="right")
     names[drawn <= slack] = SLACK
     period = (time[-1] - time[0]) / max(len(time) - 1, 1)
@@ -230,7 +230,7 @@ def taut_samples(held: HandSignals) -> np.ndarray:
 
 
 def taut_time(episode: Episode) -> float:
-    """When the hand's force begins to rise [s]. Raises UserError where it never does."""
+    """Time at which the hand's force begins to rise [s]. Raises UserError where it never does."""
     taut = taut_samples(episode)
     if not taut.any():
         raise UserError(f"episode of {episode.band}: the hand's force never rises")

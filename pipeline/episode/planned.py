@@ -16,7 +16,7 @@ CAMERA = (0.80, 0.32, 0.50)  # m, where a planned pull is looked at from
 
 
 class Leg(NamedTuple):
-    """Of the way from the fork to the draw and of its dips.
+    """A leg of the way from the fork to the draw, or of its dips.
 
     Attributes:
         name: PULL, LET_BACK or REDRAW.
@@ -106,6 +106,6 @@ def planned_pull(
 
 
 def _eased(time: np.ndarray, start: float, end: float) -> np.ndarray:
-    """From 0 to 1, at rest at both ends, with continuous acceleration, shape (T,)."""
+    """Rise from 0 to 1, at rest at both ends, with continuous acceleration, shape (T,)."""
     part = np.clip((time - start) / (end - start), 0, 1)
     return part**3 * (10 - 15 * part + 6 * part**2)

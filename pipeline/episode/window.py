@@ -33,7 +33,7 @@ class Window:
 def window_of(
     episode_params: EpisodeParams, first: float, grasp: float, release: float, margin: float = 0.0
 ) -> Window:
-    """Of `episode.duration` where grasp, release and tail fit into it, else longer.
+    """Window of `episode.duration` where grasp, release and tail fit into it, else a longer one.
 
     The usual one has as much lead-in as the tail leaves room for; a longer one has LEAD of it, ends
     with the tail, and keeps the samples' period.

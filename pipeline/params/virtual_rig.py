@@ -57,7 +57,7 @@ class RigFlow(Section):
 
 
 class RigSoftening(Section):
-    """By the largest energy so far; `energy` is over Young's modulus, or a strain."""
+    """Softening by the largest energy so far; `energy` is over Young's modulus, or a strain."""
 
     form: Literal["energy", "strain"] = "energy"
     damage: Annotated[float, Range(1, 100)]
@@ -123,7 +123,7 @@ class RigWrench(Section):
 
 
 class RigPads(Section):
-    """Of the fingers, as they truly are; `setup:` has what the lab takes them for."""
+    """Pads of the fingers, as they truly are; `setup:` has what the lab takes them for."""
 
     friction: Annotated[float, Range(0.05, 10)]
     force: Annotated[float, Range(0.1, 1000)]
@@ -138,7 +138,7 @@ class RigArm(Section):
 
 
 class RigClock(Section):
-    """Of one source's messages; the delay is from the stamp to the receipt."""
+    """Clock of one source's messages; the delay is from the stamp to the receipt."""
 
     stamp_jitter: Annotated[float, Range(0, 0.01)]
     delay: Annotated[float, Range(0, 1)]

@@ -1,1 +1,1 @@
-"""From a recording to an episode."""
+"""Build an episode from a recording."""

@@ -60,7 +60,7 @@ def why_no_band(view: View) -> str:
 
 
 def _factor(view: View, swapped: bool) -> float | None:
-    """By which the hand's depth is too large: 1, one of UNITS, or another.
+    """Factor by which the hand's depth is too large: 1, one of UNITS, or another.
 
     None where it differs from picture to picture, or too few show it.
 

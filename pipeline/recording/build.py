@@ -25,7 +25,7 @@ class Checked(Processed):
 
     @cached_property
     def findings(self) -> list[Finding]:
-        """In the order of a recording's way."""
+        """Findings of all checks, in the order in which a recording is processed."""
         return findings_of(self)
 
     @property
@@ -40,7 +40,7 @@ class Checked(Processed):
 
 
 def process(path: Path, band: BandParams, params: Params) -> Checked:
-    """Of a recording's pulls the first that can be used. Raises UserError."""
+    """Return the first of a recording's pulls that can be used. Raises UserError."""
     return process_pulls(path, band, params)[0][0]
 
 

@@ -101,7 +101,7 @@ def _hand(pull: Pull, rays: np.ndarray, k: int, time: float) -> np.ndarray:
 
 
 def _behind(points: np.ndarray) -> np.ndarray:
-    """Those of the hand without its fingertips and the band, in the hand's frame."""
+    """Points of the hand without its fingertips and the band, in the hand's frame."""
     away = np.linalg.norm(points + [0, 0, PALM], axis=1)
     return points[(away < REACH) & (points[:, 2] < -FINGERTIPS)]
 
@@ -176,7 +176,7 @@ class _Surface:
             self.tree = cKDTree(self.points)
 
     def lay(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """By how much points (P, 3) are displaced, and the root of how surely, (3,) and (3, 3).
+        """Displacement of points (P, 3), and the root of its information, (3,) and (3, 3).
 
         None where too little of the surface is seen.
         """

@@ -44,7 +44,7 @@ GIVEN_POSE, GIVEN_CAMERA = 0.002, 0.005  # s: of what was given
 
 @dataclass(frozen=True)
 class Estimate:
-    """By how much a topic's stamps are late.
+    """Estimate of how late a topic's stamps are.
 
     Attributes:
         value: Against the force's [s].
@@ -92,13 +92,13 @@ class Estimate:
 
     @property
     def rest(self) -> float:
-        """By what the stamps are corrected beside what was given [s]."""
+        """Correction of the stamps beside what was given [s]."""
         return self.value - (self.given or 0.0) if self.applied else 0.0
 
 
 @dataclass(frozen=True)
 class Delays:
-    """Of pose (and twist) and of the camera's two topics; and the tool that showed the pose's.
+    """Delays of pose (and twist) and of the camera's two topics; the tool that showed the pose's.
 
     Attributes:
         tool_inertia: Its `delay` is what `pose` leaves of it, 0 where no more than its error.

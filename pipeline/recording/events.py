@@ -1,4 +1,4 @@
-"""When the hand grasps the band and when it lets go, from gripper, force and motion."""
+"""Find when the hand grasps the band and lets it go, from gripper, force and motion."""
 
 from __future__ import annotations
 
@@ -137,14 +137,14 @@ def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = Non
 
 
 def _first_below(t: np.ndarray, x: np.ndarray, value: float, near: int) -> float:
-    """When x (S,) first falls below a value, from sample `near` - 1 on [s]; linear between."""
+    """Time [s] when x (S,) first falls below a value, from sample `near` - 1 on; linear between."""
     below = x[near:] < value
     k = near + int(np.argmax(below)) if below.any() else len(x) - 1
     return float(np.interp(-value, [-x[k - 1], -min(x[k], x[k - 1])], [t[k - 1], t[k]]))
 
 
 def _last_above(t: np.ndarray, x: np.ndarray, value: float, near: int) -> float:
-    """When x (S,) is last above a value, up to sample `near` [s]; linear between."""
+    """Time [s] at which x (S,) is last above a value, up to sample `near`; linear between."""
     above = np.flatnonzero(x[:near] > value)
     k = int(above[-1]) + 1 if len(above) else near
     return float(np.interp(-value, [-x[k - 1], -min(x[k], x[k - 1])], [t[k - 1], t[k]]))
@@ -243,7 +243,7 @@ def means(x: np.ndarray, near: int, far: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _median_step(force: np.ndarray, i: int, far: int) -> float:
-    """As the difference of long means, but blind to a knock."""
+    """Size of a step as the difference of long medians: blind to a knock, which means are not."""
     before, after = force[max(0, i - 6 * far) : i - far], force[i + far : i + 6 * far]
     return float(np.linalg.norm(np.median(before, axis=0) - np.median(after, axis=0)))
 

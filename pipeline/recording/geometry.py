@@ -66,7 +66,7 @@ class EpisodeGeometry:
         return cls(frame, geometry.base.inverse(), camera, to_color)
 
     def content(self) -> dict[str, Any]:
-        """For an episode's metadata, under `geometry`."""
+        """Return the geometry for an episode's metadata, where it stands under `geometry`."""
         camera = asdict(self.camera)
         return {
             "base_frame": self.base_frame,
@@ -77,7 +77,7 @@ class EpisodeGeometry:
 
     @classmethod
     def of_episode(cls, metadata: Mapping[str, Any], band: str) -> EpisodeGeometry:
-        """Of an episode's metadata. Raises UserError where an older version made the episode."""
+        """Read an episode's metadata. Raises UserError where an older version made the episode."""
         content = metadata.get("geometry")
         if content is None:
             raise UserError(

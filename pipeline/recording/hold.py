@@ -49,7 +49,7 @@ class Hold:
 
 
 def hold_of(done: Processed) -> Hold:
-    """Of a pull whose band is drawn at the release."""
+    """Measure the hold of a pull whose band is drawn at the release."""
     signals, scene, facts = done.signals, done.scene, done.signals.facts
     half = done.band.mass * GRAVITY / 2
     hand = signals.hand(signals.release_time - 0.01)
@@ -92,7 +92,7 @@ def _axes(
 
 
 def _pull(scene: Scene, hand: np.ndarray, grip: float = 0.0) -> np.ndarray:
-    """Of both strands on the hand, for a modulus and an area of 1, shape (3,)."""
+    """Pull of both strands on the hand, for a modulus and an area of 1, shape (3,)."""
     ways = scene.tips - hand
     lengths = np.linalg.norm(ways, axis=1)
     stretch = lengths / (scene.rest_length / 2 + np.array([grip, -grip]))

@@ -41,7 +41,7 @@ class Loop:
         base_to_camera: Transform,
         width: float,
     ) -> Loop:
-        """Of the poses of the fork in the base and in the camera, of the camera in the base.
+        """Loop of the poses of the fork in base and camera, and of the camera in the base.
 
         Args:
             width: Between the fork's tips [m].

@@ -51,7 +51,7 @@ class Motion:
 
     @classmethod
     def of(cls, pose: Stream[np.ndarray], geometry: Geometry, origin: int) -> Motion:
-        """From the pose topic; seconds since `origin` [ns]. Raises UserError."""
+        """Read the motion from the pose topic; seconds since `origin` [ns]. Raises UserError."""
         expect_dense(pose)
         turn = geometry.base.rotation * Rotation.from_quat(pose.values[:, 3:])
         path = geometry.base.apply(pose.values[:, :3])
@@ -85,7 +85,7 @@ class Motion:
     def acceleration(
         self, times: np.ndarray, point: np.ndarray, jump: float | None = None
     ) -> np.ndarray:
-        """Of a point (3,) that is fixed in the hand's frame, at times (T,); shape (T, 3).
+        """Acceleration of a point (3,) fixed in the hand's frame, at times (T,); shape (T, 3).
 
         The mean of quintic splines, fitted to the samples with knots at several phases. At the time
         `jump` [s], at which a hand that is let go starts back, the acceleration may jump, position
@@ -102,7 +102,7 @@ class Motion:
 
 
 def _knots(t: np.ndarray, period: float, jump: float | None) -> Iterator[np.ndarray]:
-    """Of each spline. Knots lie on samples, so that none is without samples around it in a gap."""
+    """Knots of each spline. They lie on samples, so that none is in a gap without samples."""
     step = max(round(KNOTS_APART / period), LEAST_BETWEEN)
     if len(t) <= 4 * step + DEGREE:
         raise UserError("the pose is too short to differentiate")

@@ -46,7 +46,7 @@ class Processed:
 
     @property
     def start(self) -> float:
-        """Of the window, since the file's first force [s]. Raises UserError."""
+        """Start of the window, since the file's first force [s]. Raises UserError."""
         return (self.signals.origin - self.pull.recording.origin) * 1e-9
 
     @cached_property
@@ -72,7 +72,7 @@ class Processed:
 
     @cached_property
     def taut_coverage(self) -> tuple[float | None, float | None]:
-        """As `coverage.taut_coverage` has it. Raises UserError."""
+        """Return what `coverage.taut_coverage` finds for this pull. Raises UserError."""
         return taut_coverage(self.scene, self.clouds)
 
     @cached_property

@@ -63,17 +63,17 @@ class Pull:
 
     @cached_property
     def force_time(self) -> np.ndarray:
-        """Of the force's samples [s], shape (S,)."""
+        """Times of the force's samples [s], shape (S,)."""
         return self.recording.wrench.seconds(self.recording.origin)
 
     @property
     def force(self) -> np.ndarray:
-        """In the wrench's frame, with the zero that the sensor has at the end [N], shape (S, 3)."""
+        """Force [N] in the wrench's frame, with the sensor's zero at the end, shape (S, 3)."""
         return self._zeroed[0]
 
     @property
     def zeroed(self) -> list[NewZero]:
-        """When the sensor was zeroed, and by how much: `force` is without these steps."""
+        """Times at which the sensor was zeroed, and by how much: `force` is without these steps."""
         return self._zeroed[1]
 
     @cached_property
@@ -111,15 +111,15 @@ class Pull:
 
     @cached_property
     def grasp(self) -> float:
-        """When the band is grasped [s]."""
+        """Time at which the band is grasped [s]."""
         return self.grasp_before(self.release.time)
 
     def grasp_before(self, release: float) -> float:
-        """When the band is grasped [s] that is let go at `release` [s]."""
+        """Time at which the band is grasped [s] that is let go at `release` [s]."""
         return find_grasp(self.opening, (self.motion.time, self.motion.path), release)
 
     def shifted(self, pose: float = 0.0, camera: float = 0.0) -> Pull:
-        """With stamps that are late by so many seconds put right.
+        """Copy with stamps that are late by so many seconds put right.
 
         The pose's clock tells the motion and the grasp, which are estimated anew where it changes;
         the camera's tells neither.
@@ -131,7 +131,7 @@ class Pull:
 
 
 def pulls_of(whole: Pull) -> list[Pull]:
-    """Each pull of a recording in time order; `whole` itself where it is one or not understood.
+    """List a recording's pulls in time order; `whole` itself where it is one or not understood.
 
     Raises:
         UserError: Several pulls are in it, but not where the hand is.
@@ -154,7 +154,7 @@ def pulls_of(whole: Pull) -> list[Pull]:
 
 
 def _next_grasp(between: Pull, release: float) -> float:
-    """When the band is grasped again [s] to be let go at `release`; half way where nothing tells.
+    """Time [s] of the next grasp, of the band let go at `release`; half way where nothing tells.
 
     Args:
         between: From the pull before to this one.

@@ -62,7 +62,7 @@ class ReleasePictures:
 
     @property
     def beyond(self) -> float:
-        """By how much the stamps are off for sure [s]; 0 where they may be right."""
+        """Least amount by which the stamps are off for sure [s]; 0 where they may be right."""
         return 0.0 if self.never else self.off(0.0)
 
     def off(self, late: float) -> float:

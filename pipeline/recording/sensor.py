@@ -68,5 +68,5 @@ def _windows(x: np.ndarray, count: int) -> np.ndarray:
 
 
 def _scatter(windows: np.ndarray) -> np.ndarray:
-    """Of single samples in each window, (W, 3), beside what changes steadily."""
+    """Scatter of single samples in each window, (W, 3), beside what changes steadily."""
     return np.std(np.diff(windows, axis=1), axis=1) / np.sqrt(2)

@@ -214,7 +214,7 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
 
 
 def _window(pull: Pull, episode: EpisodeParams) -> Window:
-    """Of the pull, all of which must have been recorded."""
+    """Window of the pull, all of which must have been recorded."""
     recording, grasp, release = pull.recording, pull.grasp, pull.release.time
     t, pose_t = pull.force_time, pull.motion.time
     first, last = max(t[0], pose_t[0]), min(t[-1], pose_t[-1])

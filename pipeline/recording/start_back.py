@@ -55,7 +55,7 @@ def start_back(pull: Pull) -> tuple[float, float] | None:
 def _begin(
     at: np.ndarray, place: np.ndarray, powers: tuple[int, ...]
 ) -> tuple[float, float, float]:
-    """When a path (N,) [m] at times (N,) is bent [s], the standard error, and what is left of it.
+    """Time at which a path (N,) [m] at times (N,) is bent [s], its standard error, the residual.
 
     Args:
         powers: Of the time since.

@@ -36,7 +36,7 @@ def keep(path: Path, episodes: Sequence[Episode], params: Params, layout: Layout
 def episodes_of(
     path: Path, band: str, params: Params, layout: Layout
 ) -> tuple[list[Episode], list[UserError]]:
-    """As `build_episodes`, of what is kept where it still holds."""
+    """Return what `build_episodes` would, from what is stored where it still holds."""
     if _keeps(path, params):
         try:
             return Episode.load_all(_folder(path, band, params, layout)), []

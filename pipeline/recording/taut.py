@@ -68,7 +68,7 @@ class Samples:
 def samples_of(
     scene: Scene, times: np.ndarray, clouds: list[np.ndarray], eye: np.ndarray, clamp: np.ndarray
 ) -> Samples | None:
-    """As `tips.measure_tips` is given it; None where too little of the drawn band is seen."""
+    """Samples of what `tips.measure_tips` gets; None where too little of the drawn band is seen."""
     signals, parts, stretches = scene.signals, [], []
     for time, cloud in zip(times, clouds, strict=True):
         if not (scene.taut(time) and scene.stretch(time) > PULLED and len(cloud)):
@@ -147,7 +147,7 @@ def from_surface(samples: Samples, state: np.ndarray, _: np.ndarray) -> tuple:
 
 
 def from_hanging(samples: Samples, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of the hanging band only y is known: residuals (H,), derivatives (H, 15)."""
+    """Residuals (H,), derivatives (H, 15) of the hanging band, of which only y is known."""
     points = Rotation.from_rotvec(state[TURN]).apply(samples.hanging) + state[SHIFT]
     off = points[:, 1] - samples.bulge * samples.thick
     slopes = np.zeros((len(points), len(PRIOR_MEAN)))
@@ -157,7 +157,7 @@ def from_hanging(samples: Samples, state: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _aside(samples: Samples, state: np.ndarray) -> tuple[np.ndarray, np.ndarray, Callable]:
-    """From the line to each corrected point (P, 3), the lines' directions (P, 3), derivatives.
+    """Offsets of corrected points from the line (P, 3), the lines' directions (P, 3), derivatives.
 
     The string sags by w x (L - x) / 2T. At its ends it is clamped and bends into its way within a
     few l = sqrt(EI / T): its line passes 2 l sin(phi / 2) beside the clamp, phi being the angle

@@ -169,7 +169,7 @@ class View:
             return None
 
     def undecoded(self, role: str) -> UserError:
-        """That no picture of this role could be decoded, with the decoder's reason."""
+        """Error that no picture of this role could be decoded, with the decoder's reason."""
         stream = getattr(self.recording, role)
         reason = "of another size than its camera info"
         try:
@@ -182,7 +182,7 @@ class View:
         )
 
     def stamp(self, number: int) -> int:
-        """Of a colour picture's header, as it was recorded [ns]."""
+        """Stamp in a colour picture's header, as it was recorded [ns]."""
         return self.recording.color.values[self.index[number][1]].stamp
 
     def marked(self, picture: np.ndarray, frame: Frame) -> np.ndarray:

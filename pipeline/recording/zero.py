@@ -84,7 +84,7 @@ def zeroed(
 
 
 def _jump(hand: Hand, time: float) -> float:
-    """By how much the hand's acceleration jumps then [m/s^2]; 0 of one that rests."""
+    """Jump of the hand's acceleration at that time [m/s^2]; 0 of a hand that rests."""
     since = np.linspace(-AROUND, AROUND, 41)
     places = hand(time + since)
     if np.linalg.norm(places - places[0], axis=1).max() < RESTS:
@@ -136,7 +136,7 @@ class Drift:
     steady: bool = True
 
     def seen_from(self, turn: Rotation) -> Drift:
-        """In another frame, into which `turn` turns the sensor's."""
+        """The drift in another frame, into which `turn` turns the sensor's."""
         change = None if self.change is None else turn.apply(self.change)
         return replace(self, rate=turn.apply(self.rate), change=change)
 

@@ -29,7 +29,7 @@ def sensitivity(landing_map: LandingMap, draws: np.ndarray, step: float = 1e-3) 
 
 
 def least_sensitive_draw(landing_map: LandingMap, target: float) -> np.ndarray:
-    """Of the draws that the map lands on `target` [m], the least sensitive one, shape (2,).
+    """Least sensitive of the draws that the map lands on `target` [m], shape (2,).
 
     NaN where the box, within the force limit, has none.
     """

@@ -75,7 +75,7 @@ class World:
         )
 
     def landing_map(self, setup: SetupParams, size: tuple[int, int]) -> LandingMap:
-        """Of launches without errors over the box of draws of `setup`."""
+        """Map launches without errors over the box of draws of `setup`."""
         box = {"draw_y": setup.draw_y, "draw_z": setup.draw_z, "max_force": setup.max_force}
         return LandingMap.simulate(self.exact, **box, size=size, checks=0)
 

@@ -95,7 +95,7 @@ def forces(y: np.ndarray, force: np.ndarray, forgetting: np.ndarray, band: BandN
 
 @compiled
 def middle_forces(states: np.ndarray, band: BandNumbers) -> np.ndarray:
-    """Of states (S, nodes, 6 + M) those on the middle node, shape (S, 3) [N]."""
+    """Forces on the middle node in states (S, nodes, 6 + M), shape (S, 3) [N]."""
     nodes = len(band.masses)
     force, forgetting = np.empty((nodes, 3)), np.empty((nodes, states.shape[2] - 6))
     result = np.empty((len(states), 3))

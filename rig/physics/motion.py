@@ -151,7 +151,7 @@ class HandMotion:
 
 
 def pull_legs(dips: Sequence[Dip]) -> list[tuple[float, float]]:
-    """When each leg of the pull ends [s], and how far the band is drawn then [m].
+    """Times at which each leg of the pull ends [s], and how far the band is drawn then [m].
 
     A dip on the way splits the pull, whose own legs take as long as without it; dips at one place
     come in the order given. Raises UserError where one leads beyond the fork.

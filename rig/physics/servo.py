@@ -40,7 +40,7 @@ class Servo(NamedTuple):
         return cls(arm.mass, arm.stiffness, float(damping), path)
 
     def acceleration(self, times: np.ndarray, states: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """At T times, by places and velocities (T, 6) and the band's forces (T, 3); (T, 3)."""
+        """Hand's acceleration at place and velocity (6,) under the band's force (3,) [m/s2]."""
         rows = zip(times, states, force, strict=True)
         return np.array([acceleration(time, state, load, self) for time, state, load in rows])
 
@@ -51,7 +51,7 @@ class Servo(NamedTuple):
 
 @compiled
 def acceleration(time: float, state: np.ndarray, force: np.ndarray, servo: Servo) -> np.ndarray:
-    """Of the hand at place and velocity (6,) under the band's force (3,) [m/s2]."""
+    """Acceleration (T, 3) at T times, by place and velocity (T, 6) and the band's force (T, 3)."""
     path = place(time, servo.path)
     astray = servo.stiffness * (state[:3] - path[0]) + servo.damping * (state[3:6] - path[1])
     return path[2] + (force - astray) / servo.mass

@@ -106,7 +106,7 @@ class ElasticString:
 
     @cached_property
     def masses(self) -> np.ndarray:
-        """Of the nodes, shape (nodes,)."""
+        """Masses of the nodes, shape (nodes,)."""
         masses = self.mass / self.length * self.shares
         masses[self.middle] += self.payload
         return masses
@@ -136,7 +136,7 @@ class ElasticString:
         return nodes, band._replace(sizes=band.sizes[first:last], **parts)
 
     def state(self, x: np.ndarray, memory: np.ndarray | None = None) -> np.ndarray:
-        """At rest at the nodes x (nodes, 3).
+        """State at rest at the nodes x (nodes, 3).
 
         Args:
             memory: Ratios (M,), see `Rubber.remembering`; None: as if held there for ever.
@@ -152,11 +152,11 @@ class ElasticString:
         return y
 
     def stretch(self, x: np.ndarray) -> np.ndarray:
-        """Of each edge, shape (edges,)."""
+        """Stretch of each edge, shape (edges,)."""
         return np.linalg.norm(x[1:] - x[:-1], axis=1) / self.sizes
 
     def forces(self, y: np.ndarray) -> np.ndarray:
-        """Of a state (nodes, 6 + M) on the nodes, shape (nodes, 3) [N]."""
+        """Forces on the nodes in a state (nodes, 6 + M), shape (nodes, 3) [N]."""
         force, forgetting = np.empty((self.nodes, 3)), np.empty((self.edges, y.shape[1] - 6))
         forces.forces(y, force, forgetting, self.band)
         return force

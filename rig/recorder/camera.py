@@ -126,7 +126,7 @@ class VirtualCamera:
 
 
 def nearer(first: Exposure, second: Exposure) -> Exposure:
-    """Both pictures of one camera as one."""
+    """Merge two pictures of one camera: at each pixel, what is nearer."""
     hidden = second.depth < first.depth
     depth = np.where(hidden, second.depth, first.depth)
     color = np.where(hidden[..., None], second.color, first.color)

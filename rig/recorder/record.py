@@ -107,7 +107,7 @@ def record(
 
 
 def instants_of(lines: np.ndarray, camera: VirtualCamera) -> np.ndarray:
-    """As many instants of one exposure as it takes that the band moves by two pixels between them.
+    """Nodes at instants of one exposure, two pixels of their way apart and MOST_INSTANTS at most.
 
     Args:
         lines: Nodes at INSTANTS equal times of the exposure, shape (INSTANTS, nodes, 3).
@@ -125,7 +125,7 @@ def instants_of(lines: np.ndarray, camera: VirtualCamera) -> np.ndarray:
 
 
 def radius(string: ElasticString, line: np.ndarray) -> np.ndarray:
-    """Of the incompressible band at its nodes [m], shape (nodes,)."""
+    """Radius of the incompressible band at its nodes [m], shape (nodes,)."""
     stretch = np.interp(
         np.arange(string.nodes), np.arange(string.edges) + 0.5, string.stretch(line)
     )

@@ -59,7 +59,7 @@ def findings(done: Processed) -> Iterator[Finding]:
 
 
 def _of_pose(tips: Tips, geometry: Geometry) -> Iterator[Finding]:
-    """Of the camera: its lens where one factor explains what is off, or else its pose."""
+    """Findings on the camera: its lens where one factor explains what is off, or else its pose."""
     if not tips.is_off:
         return
     pose = ", ".join(f"{number:g}" for number in camera_to_fork(tips, geometry))
@@ -85,7 +85,7 @@ def _of_pose(tips: Tips, geometry: Geometry) -> Iterator[Finding]:
 
 
 def camera_to_fork(tips: Tips, geometry: Geometry) -> list[float]:
-    """As setup has it: what would put the camera's clouds in their place."""
+    """Pose, in the form of setup, that would put the camera's clouds in their place."""
     believed = geometry.camera @ geometry.color.inverse()
     pose = (tips.correction @ believed).inverse()
     parts = np.array([*pose.translation, *pose.rotation.as_quat(canonical=True)])

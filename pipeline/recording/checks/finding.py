@@ -46,5 +46,5 @@ class Finding:
         return f"{self.what}: {self.cure}" if self.cure else self.what
 
     def content(self) -> dict[str, str]:
-        """For an episode's metadata."""
+        """Return the finding's texts for an episode's metadata."""
         return {"about": self.about, "what": self.what, "cure": self.cure}

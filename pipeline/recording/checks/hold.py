@@ -78,7 +78,7 @@ def _of_stiffness(hold: Hold) -> Iterator[Finding]:
 
 
 def _unit(modulus: float, weight: float | None) -> str:
-    """Of the units that make a rubber of the band, the one that makes its weight right."""
+    """Name the unit that makes a rubber of the band and its weight right; several where alike."""
     fitting = [
         name
         for name, newtons in UNITS.items()

@@ -93,7 +93,7 @@ def findings(done: Processed) -> Iterator[Finding]:
 
 
 def of_coverage(rows: list[PictureLine]) -> Iterator[Finding]:
-    """Of the rows of all pictures."""
+    """Findings from the rows of all pictures."""
     phases = by_phase(rows)
     for row in phases:
         if row.coverage < COVERAGE.get(row.phase, 0.0):

@@ -34,7 +34,10 @@ CHECKS: tuple[Check, ...] = (
 
 
 def findings_of(done: Processed) -> list[Finding]:
-    """Of one pull, in the order of the table; what refuses it is the last, for more may follow."""
+    """Findings of one pull, in the order of the table, up to the concern that refuses it.
+
+    More may follow from what refuses it.
+    """
     findings: list[Finding] = []
     for concern in CONCERNS:
         try:

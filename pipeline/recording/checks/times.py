@@ -106,7 +106,7 @@ def findings(done: Processed) -> Iterator[Finding]:
 
 
 def of_delays(done: Processed) -> Iterator[Finding]:
-    """Of pose and camera, beside what was given of them."""
+    """Findings on the delays of pose and camera, beside what was given of them."""
     for role, delay in (("pose", done.delays.pose), ("camera", done.delays.camera)):
         error, late = delay.error or 0.0, delay.value - (delay.given or 0.0)
         if abs(late) <= max(DELAY, SURE * error):
@@ -127,7 +127,7 @@ def of_delays(done: Processed) -> Iterator[Finding]:
 
 
 def of_drift(done: Processed) -> Iterator[Finding]:
-    """Of the clocks' rates, by the times of receipt."""
+    """Findings on the clocks' rates, by the times of receipt."""
     for stream, _ in topics(done):
         drift = stream.drift
         if drift.matters:
@@ -141,7 +141,7 @@ def of_drift(done: Processed) -> Iterator[Finding]:
 
 
 def of_release(seen: ReleasePictures) -> Iterator[Finding]:
-    """Of the pictures around the release, with the camera's stamps as they were."""
+    """Findings on the pictures around the release, with the camera's stamps as they were."""
     if seen.frozen:
         first, count = seen.frozen[0], len(seen.frozen)
         what = f"{count} pictures from {1e3 * first:+.0f} ms of the release on are old ones again"

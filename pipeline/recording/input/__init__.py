@@ -1,1 +1,1 @@
-"""From the bytes of an MCAP file to a `Recording`: any schema, checked, on one clock."""
+"""Read an MCAP file's bytes as a `Recording`: any schema, checked, on one clock."""

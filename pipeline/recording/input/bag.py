@@ -60,7 +60,7 @@ def metadata_of(path: Path) -> list[Path]:
 
 
 def missing_parts(path: Path) -> list[str]:
-    """In words, the parts of a bag that are not there. As `parts_of`."""
+    """List, in words, the parts of a bag that are not there. As `parts_of`."""
     parts = parts_of(path)
     if metadata_of(path):
         folder = parts[0].parent
@@ -74,7 +74,7 @@ def missing_parts(path: Path) -> list[str]:
 
 
 def once(paths: Iterable[Path]) -> list[Path]:
-    """Each recording once, where some of the files are parts of one: the first that names it."""
+    """List each recording once, where files are parts of one: the first that names it."""
     unique: list[Path] = []
     seen: set[Path] = set()
     for path in paths:
@@ -95,7 +95,7 @@ def name_of(path: Path) -> str:
 
 
 def sha256(path: Path) -> str:
-    """Of the file, also where it is a bag's only one; of several parts, of their hashes."""
+    """Hash of the file, also where it is a bag's only one; of several parts, of their hashes."""
     digests = []
     for part in parts_of(path):
         with part.open("rb") as file:

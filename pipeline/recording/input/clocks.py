@@ -68,7 +68,7 @@ class ClockRate:
     def of(
         cls, growth: tuple[float, float], reference: tuple[float, float], span: float
     ) -> ClockRate:
-        """Of what `drift` says of both topics."""
+        """Make the rate from what `drift` returns for both topics."""
         rate = (1 - growth[0]) / (1 - reference[0]) - 1
         return cls(rate, float(np.hypot(growth[1], reference[1])), span)
 
@@ -210,7 +210,7 @@ def segments(count: int, jumps: list[Jump]) -> np.ndarray:
 def offset(
     stamp: np.ndarray, log: np.ndarray, other_stamp: np.ndarray, other_log: np.ndarray
 ) -> float:
-    """By how much [s] the least delays of a topic exceed another's, where both have messages."""
+    """Excess [s] of a topic's least delays over another's, where both have messages."""
     start = min(log.min(), other_log.min())
     mine, others = _least(stamp, log, start), _least(other_stamp, other_log, start)
     common = sorted({*mine} & {*others})
@@ -220,7 +220,7 @@ def offset(
 
 
 def drift(stamp: np.ndarray, log: np.ndarray) -> tuple[float, float]:
-    """By how much the least delays grow [s/s], and its standard error; not known in a few seconds.
+    """Growth of the least delays [s/s], and its standard error; not known in a few seconds.
 
     Receipt is on the recorder's clock: only the difference of two topics says something.
     """

@@ -111,7 +111,7 @@ class Company:
         return course is not None and sets.fall_of(course) is not None
 
     def _followed(self, hands: list[Candidate], wrench: Choice) -> list[Candidate]:
-        """Those whose steps the force follows about as well as any's."""
+        """Select the hands whose steps the force follows about as well as any's."""
         force = self._course(wrench)
         if force is None:
             return hands
@@ -141,7 +141,7 @@ class Company:
         return k is not None and sets.moves_at(fingers, float(force.time[k]))
 
     def _tie(self, pose: Candidate, chosen: dict[str, Choice]) -> str:
-        """In words, another force and hand that would do as well."""
+        """Describe another force and hand that would do as well; "" where there is none."""
         wrench = chosen["wrench"]
         mine = (wrench.channel.topic, pose.topic, pose.typical.frame, wrench.typical().frame)
         for force in self.fitting("wrench"):
@@ -186,7 +186,7 @@ class Company:
         return max(nearest, default=0) > 0 or all(len(_folders(d.topic)) < 2 for d in depths)
 
     def _other_camera(self, best: Candidate, colors: list[Candidate], depths: list[Candidate]):
-        """In words, another camera with colour and depth of its own that would do as well."""
+        """Describe another camera, with its own colour and depth, that would do as well; or ""."""
         for color in colors:
             if len(color.doubts) > len(best.doubts) or color.topic == best.topic:
                 continue

@@ -86,7 +86,7 @@ def _says_nothing(schema: Schema) -> bool:
 
 
 def message_reader(decode: Decoder, read: Callable[[Message], Value]) -> Callable[[bytes], Value]:
-    """From payload to what `read` takes of its message; it raises Unreadable."""
+    """Make a function from payload to what `read` takes of its message; it raises Unreadable."""
 
     def decoded(payload: bytes) -> Value:
         message = decode(payload)
@@ -104,7 +104,7 @@ def _compiled(kind: str, encoding: str, name: str, data: bytes) -> Decoder:
 
 
 def _ros(schema: Schema) -> Decoder:
-    """By types of this schema alone, because recordings may mix versions of a type."""
+    """Decoder by types of this schema alone, because recordings may mix versions of a type."""
     text = schema.data.decode()
     if len(text) > LONGEST_SCHEMA:  # rosbags takes minutes for a megabyte
         raise ValueError(f"longer than {LONGEST_SCHEMA} characters")
@@ -135,7 +135,7 @@ def _protobuf(schema: Schema) -> Decoder:
 
 
 def _json(schema: Schema) -> Decoder:
-    """By the schema's name alone: fields are found by name, bytes are base64."""
+    """Decoder by the schema's name alone: fields are found by name, bytes are base64."""
     return lambda payload: json.loads(payload, object_hook=lambda fields: SimpleNamespace(**fields))
 
 

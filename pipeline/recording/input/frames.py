@@ -18,7 +18,7 @@ class Transform:
 
     @classmethod
     def of(cls, pose: Sequence[float] | np.ndarray) -> Transform:
-        """From [x, y, z, qx, qy, qz, qw], the pose of the source frame in the target frame."""
+        """Convert [x, y, z, qx, qy, qz, qw], the pose of the source frame in the target frame."""
         return cls(Rotation.from_quat(pose[3:]), np.asarray(pose[:3], float))
 
     @classmethod
@@ -72,7 +72,7 @@ class TransformTree:
         return down[common].inverse() @ up[common]
 
     def _to_root(self, frame: str) -> dict[str, Transform]:
-        """For the frame and each of its ancestors, the transform from `frame` to it."""
+        """Transforms from `frame` to itself and to each of its ancestors, by their names."""
         chain = {frame: Transform.identity()}
         while frame in self._parents:
             parent, pose = self._parents[frame]

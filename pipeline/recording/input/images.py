@@ -48,7 +48,7 @@ def is_depth(picture: Picture) -> bool:
 
 
 def color(picture: Picture) -> np.ndarray:
-    """To BGR, shape (H, W, 3), uint8. Raises Undecodable."""
+    """Decode a picture to BGR, shape (H, W, 3), uint8. Raises Undecodable."""
     if picture.format:
         if "compressedDepth" in picture.format:
             raise Unsupported(f"format {picture.format!r} is depth, not colour")
@@ -63,7 +63,7 @@ def color(picture: Picture) -> np.ndarray:
 
 
 def depth(picture: Picture) -> np.ndarray:
-    """To metres, shape (H, W), float32, 0 where unknown. Raises Undecodable."""
+    """Decode a picture to metres, shape (H, W), float32, 0 where unknown. Raises Undecodable."""
     if not picture.format:
         if picture.encoding not in DEPTHS:
             raise Unsupported(f"depth encoding {picture.encoding!r} is not known, {USE}")
@@ -121,7 +121,7 @@ def size_of(picture: Picture) -> tuple[int, int] | None:
 
 
 def _body(data: np.ndarray) -> np.ndarray:
-    """Of a compressedDepth message what follows on its header, which some writers leave out."""
+    """Return what follows a compressedDepth message's header, which some writers leave out."""
     return data if np.array_equal(data[: len(PNG)], PNG) else data[DEPTH_HEADER.size :]
 
 

@@ -179,7 +179,7 @@ def _numbers(element: ElementTree.Element | None, key: str, default: str) -> np.
 
 
 def _resolved(path: Path, joint: Joint, by_name: dict[str, Joint]) -> Joint:
-    """With the joint that is really measured as source, also where a mimic mimics a mimic."""
+    """Joint whose source is the one really measured, also where a mimic mimics a mimic."""
     source, multiplier, offset = joint.source, joint.multiplier, joint.offset
     for _ in by_name:
         other = by_name.get(source)

@@ -86,7 +86,7 @@ def without_bursts(
 
 
 def hold_of(stamp: np.ndarray, values: np.ndarray) -> float | None:
-    """For how long each value is repeated [ns]; None where they are not held alike for long.
+    """Time for which each value is repeated [ns]; None where they are not held alike for long.
 
     Args:
         stamp: Increasing [ns], shape (S,).

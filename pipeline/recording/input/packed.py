@@ -120,7 +120,7 @@ def _chunks_fit(data: np.ndarray) -> bool:
 
 
 def _webp_size(kind: bytes, body: bytes) -> tuple[int, int]:
-    """Of the first chunk: developers.google.com/speed/webp/docs/riff_container."""
+    """Width and height in the first chunk: developers.google.com/speed/webp/docs/riff_container."""
     if len(body) < 10:
         raise Undecodable("WebP is cut off")
     if kind == b"VP8X":

@@ -85,7 +85,7 @@ class Recording:
         return {role: stream for role, stream in by_role.items() if stream}
 
     def depth_picture(self, number: int) -> np.ndarray | None:
-        """In metres, 0 where unknown, of the camera's size (H, W); None where it is damaged."""
+        """Depth [m], 0 where unknown, of the camera's size (H, W); None where it is damaged."""
         try:
             depth = images.depth(self.depth.values[number])
         except images.Undecodable:
@@ -99,7 +99,7 @@ class Recording:
         return replace(self, **cut, start=self.origin)
 
     def shifted(self, pose: float = 0.0, camera: float = 0.0) -> Recording:
-        """With stamps that are late by so many seconds put right: pose and twist; pictures."""
+        """Copy with stamps that are late by so many seconds put right: pose and twist; pictures."""
         return replace(
             self,
             pose=self.pose.shifted(pose),
@@ -121,7 +121,7 @@ def read_recording(path: Path, setup: SetupParams, delays: DelayParams | None = 
 def recording_of(
     container: Container, setup: SetupParams, delays: DelayParams | None = None
 ) -> Recording:
-    """As `read_recording`, from a file that was read already."""
+    """Do what `read_recording` does, from a file that was read already."""
     try:
         transforms = transforms_of(container)
         chosen = choose(container, setup, transforms.frames)

@@ -146,7 +146,7 @@ def crc(file: BinaryIO, start: int, end: int) -> int:
 
 
 def _decompressed(compression: str, packed: bytes, size: int) -> bytes:
-    """At most one byte more than `size`, whatever the compressed frame says of itself."""
+    """Unpack at most one byte more than `size`, whatever the compressed frame says of itself."""
     if compression == "zstd":
         stream = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
         return stream.read(size) + stream.read(1)

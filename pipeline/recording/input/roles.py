@@ -180,7 +180,7 @@ class Candidate:
 
     @property
     def hints(self) -> list[str]:
-        """Those in the topic's name: whole words, or long ones within words."""
+        """The role's hints in the topic's name: whole words, or long ones within words."""
         name = self.topic.lower()
         return [h for h in self.role.hints if h in self._words or (len(h) > 3 and h in name)]
 

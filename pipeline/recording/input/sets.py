@@ -50,7 +50,7 @@ class Track:
 def course_of(
     channel: Channel, read: Callable[[bytes], Reading], most: int = LOOKED_AT
 ) -> Track | None:
-    """Of at most so many messages, evenly spread; None where fewer than two can be read."""
+    """Track of at most so many messages, evenly spread; None where fewer than two can be read."""
     count = len(channel.payloads)
     times, stamps, values = [], [], []
     for k in np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int)):
@@ -141,7 +141,7 @@ def moves_at(fingers: Track, fall: float) -> bool:
 def opening_of(
     values: np.ndarray, moments: np.ndarray, fall: Callable[[], int | None]
 ) -> np.ndarray:
-    """Of the positions of fingers (S, C) that of the hand that let go, shape (S, 1).
+    """Opening of the hand that let go, shape (S, 1), from the positions of fingers (S, C).
 
     Fingers of a mirrored sign count the other way round, those of another device not at all.
 

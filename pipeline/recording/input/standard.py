@@ -57,7 +57,7 @@ def adds_nothing(schema: str, text: bytes) -> bool:
 
 
 def reader(schema: str) -> Callable[[bytes], Any]:
-    """From payload to message, of a standard type."""
+    """Make a function from payload to message, of a standard type."""
     store, name = _store(), name_of(schema)
     return lambda payload: store.deserialize_cdr(payload, name)
 
@@ -89,7 +89,7 @@ def _same(payload: bytes, name: str) -> bool:
 
 
 def plain(payload: bytes, most: int) -> bytes:
-    """Of CDR, of at most so many bytes. Raises ValueError where it is XCDR2 or too long."""
+    """Return CDR of at most so many bytes. Raises ValueError where it is XCDR2 or too long."""
     if payload[:4] == ZSTD:  # ros2 bag record --compression-mode message
         with zstandard.ZstdDecompressor().stream_reader(payload) as stream:
             payload = stream.read(most + 1)

@@ -77,7 +77,7 @@ class Stream(Generic[Values]):
         return replace(self, stamp=self.stamp[begin:end], values=self.values[begin:end])
 
     def shifted(self, seconds: float) -> Stream[Values]:
-        """With `seconds` subtracted from every stamp."""
+        """Copy with `seconds` subtracted from every stamp."""
         return replace(self, stamp=self.stamp - round(seconds * 1e9)) if seconds else self
 
 

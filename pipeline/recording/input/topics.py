@@ -94,7 +94,7 @@ class _Chooser:
         return replace(best.choice, why=_why(best, candidates), doubt=doubt)
 
     def _fitting(self, role: str) -> list[Candidate]:
-        """Those that could play the role by what they are, asked for once."""
+        """Candidates that could play the role by what they are, looked for once."""
         if role not in self.fitting:
             self.problems = []
             candidates = [self._candidate(role, channel) for channel in self.container.channels]

@@ -14,5 +14,5 @@ def few(words: list[str], most: int) -> str:
 
 
 def shortened(text: str, most: int) -> str:
-    """At most so many characters: names in a recording are of any length."""
+    """Cut a text to at most so many characters: names in a recording are of any length."""
     return text if len(text) <= most else f"{text[: most - 3]}..."

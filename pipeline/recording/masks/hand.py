@@ -34,7 +34,7 @@ class Shape:
 
     @classmethod
     def learn(cls, clouds: Iterable[np.ndarray], often: float = OFTEN) -> Shape | None:
-        """From clouds (S, 3), relative to the tool centre point, that do not show the band."""
+        """Shape in clouds (S, 3), relative to the tool centre point, that do not show the band."""
         counts, frames = np.zeros((2 * HALF,) * 3, np.int32), 0
         for cloud in clouds:
             inside, cells = _voxels(cloud)
@@ -49,7 +49,7 @@ class Shape:
 
     @classmethod
     def swept(cls, first: Shape | None, last: Shape | None) -> Shape | None:
-        """Both and what is between them: fingers on their way."""
+        """Shape of both and what is between them: fingers on their way."""
         if first is None or last is None:
             return None
         between = binary_closing(np.pad(first.taken | last.taken, GAP), iterations=GAP)
@@ -81,7 +81,7 @@ class Colors:
 
     @classmethod
     def learn(cls, band: np.ndarray, hand: np.ndarray) -> Colors | None:
-        """From BGR pixels (S, 3) of both; None where colours do not tell them apart."""
+        """Learn from BGR pixels (S, 3) of both; None where colours do not tell them apart."""
         samples = [pixels[_bright(pixels)] for pixels in (band, hand)]
         if min(map(len, samples)) < ENOUGH:
             return None

@@ -113,7 +113,7 @@ class RidgeMask:
         return time < self.scene.signals.grasp_time
 
     def _from_middle(self, points: np.ndarray) -> np.ndarray:
-        """From where the hanging band is grasped, shape (S, 3)."""
+        """Points relative to where the hanging band is grasped, shape (S, 3)."""
         return points - self.scene.signals.hand(self.scene.signals.grasp_time)
 
     def _around_hand(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
@@ -134,7 +134,7 @@ class RidgeMask:
         return frame.color[candidates][sure]
 
     def _shapes(self, time: float) -> list[Shape | None]:
-        """Of the hand at that time; more than one while the fingers move."""
+        """Shapes of the hand at that time; more than one while the fingers move."""
         signals = self.scene.signals
         if self.scene.taut(time):
             return []  # the lines to the hand leave room for little more than the fingers' tips

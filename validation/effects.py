@@ -11,7 +11,7 @@ KEY = "method", "band", "switch", "recording", "seed"
 
 
 def effects(results: list[dict], switches: list[str], methods: list[str], bands: list[str]) -> dict:
-    """By method, group of bands (`rig`, and each other band) and setting: means and changes.
+    """Means and changes by method, group of bands (`rig`, and each other band) and setting.
 
     Args:
         results: Each with "band", "recording", "switch", "method", "seed" and, unless it "failed",
@@ -130,7 +130,7 @@ def runs(figures: dict, rows: dict[str, str], methods: dict[str, str]) -> list[s
 
 
 def _typeset(*cells: str) -> tuple[str, ...]:
-    """With a minus, and nothing where there is no number."""
+    """Typeset cells with a minus, and a dash where there is no number."""
     return tuple("–" if "nan" in cell else cell.replace("-", "−") for cell in cells)
 
 

@@ -143,7 +143,7 @@ def _met(content: dict) -> bool | None:
 
 
 def _by_commit(content: dict, code: Path) -> str:
-    """By what Git says of the sources since then; a dirty commit is known to be older at most."""
+    """Judge by Git's diff of sources since then; a dirty commit is known to be older at most."""
     commit = content.get("commit")
     if not isinstance(commit, str):
         return UNKNOWN

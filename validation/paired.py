@@ -41,7 +41,7 @@ def holm(p: np.ndarray) -> np.ndarray:
 
 
 def compared(values: dict[str, np.ndarray], reference: str) -> dict[str, dict]:
-    """Each method's values (N,) against the reference's, pair by pair.
+    """Compare each method's values (N,) with the reference's, pair by pair.
 
     Returns:
         By method: the mean difference (method less reference) with its interval, over pairs of

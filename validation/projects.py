@@ -156,7 +156,7 @@ class MarkedRun:
         self.environment = environment(**{MARK: self.mark}, **more)
 
     def start(self, *command: str) -> subprocess.Popen:
-        """In a session of its own; its lines, errors among them, go to `log`."""
+        """Start a command in a session of its own; its lines, errors among them, go to `log`."""
         with self.log.open("w") as message:
             return subprocess.Popen(
                 command, cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,

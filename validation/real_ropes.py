@@ -40,7 +40,7 @@ DEFORM_SOURCE = "roahmlab/DEFORM, commit b73b8b8, loss_record/eval_loss_DLO*.pkl
 
 
 def rms(gaps: np.ndarray, axis=None) -> np.ndarray:
-    """Of distances [mm] of gaps (T, M, 3) [m]."""
+    """Root mean square of distances [mm] of gaps (T, M, 3) [m]."""
     return 1e3 * np.sqrt((gaps**2).sum(2).mean(axis))
 
 
@@ -77,7 +77,7 @@ def measured(first: np.ndarray, second: np.ndarray, size: SlingParams) -> tuple[
 
 
 def finer(run: np.ndarray, rope: dict, size: SlingParams, chords: np.ndarray) -> float:
-    """By how much half the edges and half the steps move a prediction, rms [mm]."""
+    """Change of a prediction by edges and steps of half the length, rms [mm]."""
     coarse, fine = (swing(run, chords, rope["values"], size, parts=n, refine=n) for n in (1, 2))
     return round(float(rms(inner(fine - coarse))), 1)
 

@@ -47,7 +47,7 @@ def pull_and_release(band: str, shape, sling: ClampedBand) -> Episode:
 
 
 def ease(t: np.ndarray, first: float, last: float) -> np.ndarray:
-    """From 0 at `first` to 1 at `last`, half a cosine."""
+    """Rise from 0 at `first` to 1 at `last`, half a cosine."""
     return 0.5 - 0.5 * np.cos(np.pi * np.clip((t - first) / (last - first), 0, 1))
 
 

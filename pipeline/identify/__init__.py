@@ -1,1 +1,1 @@
-"""From episodes to parameters: clamps, objective, search, optimisers, posterior, and θ files."""
+"""Identification from episodes: clamps, objective, search, optimisers, posterior, θ files."""

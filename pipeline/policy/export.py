@@ -192,7 +192,7 @@ def card(
 
 
 def _projectile(policy: Policy) -> dict:
-    """Of the card: the input that a policy has which sees the projectile."""
+    """Part of the card on the input of a policy that sees the projectile; empty for any other."""
     if not isinstance(policy, ProjectilePolicy):
         return {}
     content = {
@@ -208,7 +208,7 @@ def _projectile(policy: Policy) -> dict:
 
 
 def _strict(value: object) -> object:
-    """As strict JSON has it: no NaN, no numbers of NumPy's."""
+    """Make a value strict JSON: no NaN, no numbers of NumPy's."""
     if isinstance(value, dict):
         return {name: _strict(entry) for name, entry in value.items()}
     if isinstance(value, float | np.floating):

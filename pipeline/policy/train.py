@@ -87,7 +87,7 @@ class ProjectilePolicy(Policy):
         return self.draw_center + self.draw_half * torch.tanh(action)
 
     def draws(self, targets: np.ndarray) -> np.ndarray:
-        """For targets (N,) [m] and the projectile where it starts, shape (N, 2)."""
+        """Draws for targets (N,) [m] and the projectile where it starts, shape (N, 2)."""
         goals = torch.as_tensor(targets, dtype=torch.float32)[:, None]
         with torch.inference_mode():
             return self(self.projectile.expand(len(goals), 2), goals).double().numpy()

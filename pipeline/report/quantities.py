@@ -23,7 +23,7 @@ class Quantity:
 
     @property
     def heading(self) -> str:
-        """Of a column or an axis, as in "E [kPa]"."""
+        """Heading of a column or an axis, as in "E [kPa]"."""
         return f"{self.symbol} [{self.unit}]" if self.unit else self.symbol
 
 
@@ -54,5 +54,5 @@ def coordinate(name: str) -> str:
 
 
 def rounded(value: float, digits: int = 3) -> float:
-    """To so many significant digits: another kind of CPU differs beyond them."""
+    """Round to so many significant digits: another kind of CPU differs beyond them."""
     return float(f"{value:.{digits}g}")

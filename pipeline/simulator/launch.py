@@ -167,7 +167,7 @@ def outcomes(
     lanes: np.ndarray,
     draws: np.ndarray,
 ) -> Launches:
-    """Of launches from draws (N, 2), by the slings' records (N,) of records.LANE."""
+    """Find the launches from draws (N, 2), by the slings' records (N,) of records.LANE."""
     outcome = np.round(lanes["outcome"])
     hold_force = np.linalg.norm(lanes["hold_force"], axis=1)
     hold_force[outcome > 0] = np.nan

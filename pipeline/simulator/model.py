@@ -228,5 +228,5 @@ class ClampedBand:
 
     @property
     def tips(self) -> np.ndarray:
-        """Both ends of the band, shape (2, 3)."""
+        """The two ends of the band, shape (2, 3)."""
         return np.array([[-self.half_width, 0.0, 0.0], [self.half_width, 0.0, 0.0]])

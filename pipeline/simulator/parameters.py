@@ -44,7 +44,7 @@ class Parameters:
 
     @classmethod
     def of(cls, law: str, theta: np.ndarray, **others: float | np.ndarray) -> Parameters:
-        """Of THETA's values (N, 5) or (5,), and others by their names, one or one a sample."""
+        """Make parameters of THETA's values (N, 5) or (5,); others by name, one or one a sample."""
         return cls.named(law, dict(zip(THETA, np.asarray(theta, float).T, strict=True)) | others)
 
     @classmethod
@@ -54,7 +54,7 @@ class Parameters:
         columns: Mapping[str, float | np.ndarray],
         others: Mapping[str, float] | None = None,
     ) -> Parameters:
-        """Of values by their names, one or one a sample; `others` where `columns` has none.
+        """Make samples of values by name, one or one a sample; `others` where `columns` has none.
 
         Raises:
             ValueError: A name is not one of the law, or one of THETA is missing.
@@ -68,7 +68,7 @@ class Parameters:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the columns, length P."""
+        """Names of the columns, length P."""
         return names_of(self.law)
 
     def __len__(self) -> int:
@@ -80,7 +80,7 @@ class Parameters:
 
     @property
     def theta(self) -> np.ndarray:
-        """Of THETA alone, shape (N, 5)."""
+        """Values of THETA alone, shape (N, 5)."""
         return self.values[:, : len(THETA)]
 
     def column(self, name: str) -> np.ndarray:

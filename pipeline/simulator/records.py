@@ -16,7 +16,7 @@ BRANCHES = len(TIMES)
 
 
 def _record(*fields: str | tuple[str, int]) -> np.dtype:
-    """Of numbers, and vectors of so many of them."""
+    """Type of a record of numbers, and of vectors of so many of them."""
     return np.dtype(
         [
             (field, float) if isinstance(field, str) else (field[0], float, field[1:])
@@ -26,7 +26,7 @@ def _record(*fields: str | tuple[str, int]) -> np.dtype:
 
 
 class Mode(IntEnum):
-    """Of a step: RELAX begins without speed and feels no air."""
+    """Mode of a step: RELAX begins without speed and feels no air."""
 
     RELAX, MOVE = range(2)
 
@@ -38,7 +38,7 @@ class Grip(IntEnum):
 
 
 class Outcome(IntEnum):
-    """Of a sling; SEPARATED: the projectile has left the pouch."""
+    """Outcome of a sling's steps; SEPARATED: the projectile has left the pouch."""
 
     SEPARATED, GOING_ON, NOT_CONVERGED, SLIPPED = range(-1, 3)
 

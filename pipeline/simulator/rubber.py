@@ -29,7 +29,7 @@ def memories(law: str) -> int:
 
 
 def relaxed(relaxation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of a relaxation (...) the share of Young's modulus that never relaxes, and a branch's."""
+    """Share of Young's modulus that never relaxes, and a branch's, at a relaxation (...)."""
     weight = DECADES * np.asarray(relaxation, float)
     return 1 - weight * np.exp(-LATER / TIMES).sum(), weight
 
@@ -54,7 +54,7 @@ def uniaxial(
 def work(
     stretch: np.ndarray, share: np.ndarray | float, upturn: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """Of `uniaxial` from rest, stretches >= 1."""
+    """Work of `uniaxial` from rest, stretches >= 1."""
     first, second = stretch**2 + 2 / stretch - 3, 2 * stretch + stretch**-2 - 3
     return (first + share * (second - first)) / 2 + upturn * first**2 / 4
 

@@ -45,8 +45,9 @@ class Slings:
         rigidity: float | np.ndarray | None = None,
         **lanes: float | np.ndarray,
     ) -> Slings:
-        """With N parameters, at rest; `lanes` are fields of records.LANE, else 0.
+        """Make slings of N parameters, at rest.
 
+        `lanes` are fields of records.LANE, else 0 (`worst` else from what the band has seen).
         `rigidity` is as of `material`.
         """
         records = np.zeros(len(parameters), LANE)

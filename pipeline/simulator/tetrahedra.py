@@ -18,7 +18,7 @@ def section(radius: float) -> np.ndarray:
 
 
 def shares() -> np.ndarray:
-    """Of each vertex in the mass of its section, shape (VERTICES,).
+    """Share of each vertex in the mass of its section, shape (VERTICES,).
 
     A quarter of each tetrahedron's mass: as much from the slab before a section as from the one
     after where both are equally long.

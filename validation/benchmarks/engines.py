@@ -151,7 +151,7 @@ def table(entries: list[dict]) -> str:
 
 
 def _force_error(sling: ClampedBand, episode, force: np.ndarray) -> float:
-    """Of the drawn band's force on the hand, against two straight, weightless halves."""
+    """Relative error of the drawn band's force on the hand, against straight, weightless halves."""
     hand = episode.position[np.searchsorted(episode.time, episode.release_time) - 1]
     legs = sling.tips - hand
     lengths = np.linalg.norm(legs, axis=1, keepdims=True)

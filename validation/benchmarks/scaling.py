@@ -118,7 +118,7 @@ def _counts(most: int) -> list[int]:
 def _compared(
     works: list[Callable[[], object]], teams: list[Sequence[str]], numbers: Callable
 ) -> dict:
-    """Each work's best time, and whether its numbers are the first one's."""
+    """Measure each work's best time, and whether its numbers are the first one's."""
     first = numbers(works[0]())  # untimed: memory of this size has been asked for then
     walls, equal = [], []
     for work in works:

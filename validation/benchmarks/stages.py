@@ -81,7 +81,7 @@ class Project:
         return self.python(*(("-P", str(quick)) if quick.is_file() else DVC), *words)
 
     def steps(self) -> dict[str, tuple[str, str]]:
-        """By step, its first stage and the command of that, as dvc.lock has them."""
+        """First stage of each step and the command of that, as dvc.lock has them."""
         text = (self.folder / "dvc.lock").read_text(encoding="utf-8")
         first_stages: dict[str, tuple[str, str]] = {}
         for name, entry in YAML(typ="safe").load(text)["stages"].items():

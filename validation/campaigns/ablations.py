@@ -140,7 +140,7 @@ def lost(result: dict) -> bool:
 
 
 def summary(results: list[dict], bands: Sequence[str], methods: Sequence[str]) -> dict:
-    """Of each band, and of all: methods' means, and how each compares with the paper's."""
+    """Summarise each band, and all: methods' means, and how each compares with the paper's."""
     by = {(r["band"], r["recording"], r["method"], r["seed"]): r for r in results}
 
     def picked(band: str, method: str, keys) -> list[dict]:

@@ -93,7 +93,7 @@ def performed(job: Recorded, work: Path) -> dict:
 
 
 def figures(lines: list[dict]) -> dict:
-    """By what the camera's clock is held against: errors [s], and how true those stated are."""
+    """Errors [s] by what the camera's clock is held against, and how true those stated are."""
     good, result = [line for line in lines if "failed" not in line], {}
     for name in ("pose", "release", "force"):
         off, stated_errors = (

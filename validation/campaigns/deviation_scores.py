@@ -67,7 +67,7 @@ def forces(band: str, outcome: Calibrated, episode: Episode) -> dict:
 
 
 def misses(band: str, outcome: Calibrated, seen: Episode, recordings: Path | None) -> dict:
-    """Of a rig band, launches at the targets [m]; of `orange`, predictions of measured ones."""
+    """Errors of launches at the targets [m]; of `orange`, of predictions of measured launches."""
     params = params_of(band, AS_IS)
     if band != orange.NAME:
         return launches(band, params, aimed(outcome, params, params.trials.targets))

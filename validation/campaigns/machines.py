@@ -62,7 +62,7 @@ class MachineLandings(JsonRecord):
 
 
 class MachineReport(JsonRecord):
-    """As much of a machine's JSON as is compared."""
+    """The part of a machine's JSON that is compared."""
 
     processor: str
     device: str
@@ -180,7 +180,7 @@ def apart(summary: list[MachineLandings]) -> float:
 
 
 def _comparable(report: MachineReport, what: str) -> object:
-    """Of the code, what computes: pipeline/ without what it prints, stores and starts by."""
+    """Value to compare; of the code, pipeline/ without what it prints, stores and starts by."""
     value = getattr(report, what)
     if what != "code":
         return value

@@ -98,7 +98,7 @@ def run(
 
 
 def _results(folder: Path, family: str, container: str, first: int, end: int) -> Iterator[Result]:
-    """Of one share; where a process ends too early, the recording that was next is a fault."""
+    """Results of one share; the recording next when a process ends too early is a fault."""
     module, log = "validation.campaigns.outcomes", folder / f"{family}-{container}-{first}.log"
     while first < end:
         command = [sys.executable, "-m", module, folder, family, container, first, end]
@@ -155,7 +155,7 @@ def counts(results: list[Result]) -> dict[str, dict[str, dict[str, int]]]:
 
 
 def summary(results: list[Result], wanted: int) -> dict:
-    """Of results in the order of their keys."""
+    """Summarise results in the order of their keys."""
     failed = faults(results)
     slowest = max(results, key=lambda result: result["s"])
     largest = max(results, key=lambda result: result["bytes"])

@@ -48,7 +48,7 @@ def performed(job: Drawn) -> dict:
 
 
 def figures(lines: list[dict]) -> dict:
-    """By pull: what the ranks of each coordinate and of the landings say."""
+    """Figures by pull: what the ranks of each coordinate and of the landings say."""
     result = {}
     for pull in PULLS:
         some = [line for line in lines if line["pull"] == pull]

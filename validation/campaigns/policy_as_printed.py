@@ -113,7 +113,7 @@ def result(lesson: Lesson, params: Params, work: Path, method: str) -> dict:
 
 
 def summary(results: list[dict]) -> dict:
-    """By band and switch: |y - g| in cm, means over seeds, each of the mean over the targets."""
+    """Means of |y - g| in cm by band and switch, over seeds, each of the mean over the targets."""
     figures: dict[str, dict] = {}
     for row in results:
         figures.setdefault(row["band"], {}).setdefault(row["switch"], []).append(row)

@@ -140,7 +140,7 @@ def fitted(scalar: Scalar, way: np.ndarray, force: np.ndarray) -> tuple[float, d
 
 
 def judged(params: Params, name: str, pulls: dict[str, Sequence[Dip]]) -> dict:
-    """Of a rubber, by pull: errors of the energy [%] at DRAWS, means over REPEATS."""
+    """Errors of a rubber's energy [%] by pull, at DRAWS, means over REPEATS."""
     scalar, hidden = Scalar(params, name), params.rig.bands[name]
     rubber = world.rubber_of(hidden, 1.0)
     way = scalar.pull(())

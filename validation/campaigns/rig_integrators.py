@@ -123,7 +123,7 @@ def by_lsoda(rtol: float) -> Iterator[None]:
 
 
 def rubber(params: Params, changes: dict[str, Any]) -> Params:
-    """With another rubber of BAND's."""
+    """Params with another rubber of BAND's."""
     band = params.rig.bands[BAND]
     bands = params.rig.bands | {
         BAND: type(band).model_validate(band.model_dump() | changes),
@@ -152,7 +152,7 @@ def launched(string: ElasticString, params: Params, draws: np.ndarray = DRAWS) -
 
 
 def apart(interaction: Interaction, other: Interaction) -> dict[str, float]:
-    """By how much two interactions differ at most."""
+    """Largest differences between two interactions."""
     far = np.linalg.norm(interaction.lines - other.lines, axis=-1).max(axis=1)
     slipped = interaction.seen > max(interaction.slip_time, other.slip_time)
     held = interaction.seen < min(interaction.slip_time, other.slip_time)
@@ -170,7 +170,7 @@ def apart(interaction: Interaction, other: Interaction) -> dict[str, float]:
 
 
 def _both(interaction: Interaction, other: Interaction) -> np.ndarray:
-    """Of the sensor's times, those at which both hold the band or neither does."""
+    """Mask of the sensor's times at which both hold the band or neither does."""
     return (interaction.force != 0).any(axis=1) == (other.force != 0).any(axis=1)
 
 
@@ -200,7 +200,7 @@ def compared(params: Params, draws: np.ndarray = DRAWS) -> dict[str, Any]:
 
 
 def report(params: Params, rubbers: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Of the rubbers that are compared."""
+    """Report on the rubbers that are compared."""
     most = {
         what: max(row["cvode_against_lsoda"][what] for row in rubbers.values()) for what in ASKED
     }

@@ -180,7 +180,7 @@ def saved(params: Params, path: Path) -> Path:
 
 
 def summary(results: list[dict]) -> dict:
-    """Of results at TARGETS, or their own: mean error, misses, coverage, width, as shares."""
+    """Summarise results at TARGETS, or their own: misses [m]; error, coverage, width as shares."""
     targets = np.array([result.get("targets", TARGETS) for result in results])
     error, miss, low, high = (
         np.array([result[name] for result in results], float)

@@ -53,7 +53,7 @@ class ResultLines:
             self.lines.append(result)
 
     def of(self, kind: type[Job]) -> dict[Job, Result]:
-        """Each job's result, as it was written last."""
+        """Results by job, each as it was written last."""
         names = [field.name for field in fields(kind)]
         return {kind(*(line[name] for name in names)): line for line in self.lines}
 
@@ -135,7 +135,7 @@ def made_once(path: Path, make: Callable[[], object]):
 
 
 def plain(value: object, digits: int | None = None):
-    """For JSON: NumPy's numbers as Python's, null for what is not finite; floats to some digits."""
+    """Convert for JSON: NumPy's numbers to Python's, not finite to null; floats to some digits."""
     if isinstance(value, dict):
         return {str(key): plain(part, digits) for key, part in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):

@@ -79,7 +79,7 @@ class SplitPictures:
 
 
 def by_mesh(params: Params, band: str, episode: Episode) -> dict:
-    """By mesh: the damping that each part's pictures would have.
+    """Damping that each part's pictures would have, by mesh.
 
     `sensitivity_cm` is how far the part's pictures alone move the geometric term over DAMPINGS;
     `reach_m` is how far beyond the fork a picture sees the middle of the band with theta as it is.

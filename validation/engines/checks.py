@@ -50,7 +50,7 @@ SAME_MESH = {"edges": 52, "grading": 1.0}  # of `tet_edges`, evenly spaced
 
 @dataclass(frozen=True)
 class EnginePull:
-    """Both engines while the hand holds the band.
+    """Pull in both engines, while the hand holds the band.
 
     Attributes:
         times: Of the forces [s], shape (S,).
@@ -247,7 +247,7 @@ def sling_of(bench: Bench) -> ClampedBand:
 
 
 def damped(thetas: np.ndarray) -> Parameters:
-    """Of thetas (N, 5): MuJoCo and PhysX damp the rate of the nominal stress."""
+    """Parameters of thetas (N, 5): MuJoCo and PhysX damp the rate of the nominal stress."""
     return Parameters.of(NEO_HOOKEAN, thetas, turn_damping=1.0)
 
 

@@ -61,17 +61,17 @@ class FlexBand:
 
     @property
     def positions(self) -> np.ndarray:
-        """Of all vertices, shape (sections, V, 3)."""
+        """Positions of all vertices, shape (sections, V, 3)."""
         return self.tube.rest + self.data.qpos.reshape(self.tube.rest.shape)
 
     @property
     def velocities(self) -> np.ndarray:
-        """Of all vertices, a view of shape (sections, V, 3)."""
+        """Velocities of all vertices, a view of shape (sections, V, 3)."""
         return self.data.qvel.reshape(self.tube.rest.shape)
 
     @property
     def center_line(self) -> np.ndarray:
-        """Of the band between the clamps, shape (L, 3)."""
+        """Centre line of the band between the clamps, shape (L, 3)."""
         return self.positions[1:-1, 0]
 
     def hold(self, held: bool) -> None:

@@ -130,7 +130,7 @@ class Bands:
             self.solver.step(now, after, self.control, None, self.step_size)
 
     def positions(self) -> np.ndarray:
-        """Of all vertices, shape (N, sections, V, 3)."""
+        """Positions of all vertices, shape (N, sections, V, 3)."""
         return self.states[0].particle_q.numpy().reshape(-1, *self.tube.rest.shape)
 
     def forces(self) -> np.ndarray:

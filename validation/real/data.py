@@ -50,7 +50,7 @@ def _silicone(file: Path) -> Curve:
 
 
 def multiaxial(folder: Path) -> dict[str, dict[str, np.ndarray]]:
-    """By publication, of each mode stretches and nominal stresses (n, 5): F11, F22, F33, S11, S22.
+    """Read stretches and nominal stresses (n, 5) by publication and mode: F11, F22, F33, S11, S22.
 
     Cauchy stresses are taken back to nominal ones.
     """
@@ -91,7 +91,7 @@ def acrylic(folder: Path) -> list[Curve]:
 
 
 def ropes(folder: Path) -> dict[str, list[np.ndarray]]:
-    """Of each rope its runs in the order of their names: markers (T, M, 3) [m].
+    """Read the runs of each rope in the order of their names: markers (T, M, 3) [m].
 
     100 frames a second. Two robots move the ends; Chen et al., CoRL 2024, `deform_dlo_mocap`.
     """

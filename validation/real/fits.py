@@ -26,7 +26,7 @@ class CurveFit:
 
     @property
     def rms(self) -> float:
-        """In percent of the peak."""
+        """Root mean square of what is left, in percent of the peak."""
         return float(100 * np.sqrt(np.mean(self.left**2)))
 
 

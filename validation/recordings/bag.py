@@ -84,7 +84,7 @@ class Truth:
         return self.grasp <= t < self.release
 
     def force(self, t: float) -> np.ndarray:
-        """Of the band on the gripper, frame O."""
+        """Force of the band on the gripper, frame O."""
         if not self.holds(t):
             return np.zeros(3)
         hand = self.hand(t)

@@ -92,7 +92,7 @@ LOOKS = {
 
 @dataclass
 class FrameTruth:
-    """Of one picture: what each pixel shows, and the band's middle and radius."""
+    """Truth of one picture: what each pixel shows, and the band's middle and radius."""
 
     line: np.ndarray  # (N, 3) frame O
     radius: np.ndarray  # (N,)
@@ -241,7 +241,7 @@ def _jpeg(look: Appearance, part: np.ndarray, bright: np.ndarray, random) -> Pic
 
 
 def _millimetres(depth: np.ndarray, random) -> Picture:
-    """As a time-of-flight camera gives them, 0 for none."""
+    """Picture of depths as a time-of-flight camera gives them, in millimetres, 0 for none."""
     depth = np.where(depth < RANGE, depth, 0).astype(np.float32)
     near = cv2.erode(np.where(depth > 0, depth, 9).astype(np.float32), np.ones((2, 2)))
     far = cv2.dilate(depth, np.ones((2, 2)))

@@ -48,7 +48,7 @@ def score(
 
 
 def figures(view: View, truths: list[FrameTruth], clouds: object) -> dict[str, dict[str, float]]:
-    """Of all frames and of each phase: median distance from the surface, covered share, strays."""
+    """Score all frames and each phase: median distance from the surface, covered share, strays."""
     phase_scores: dict[str, list] = {"all": []}
     numbered = zip(view.frames(), clouds.points, strict=True)
     for (number, frame), points in numbered:

@@ -71,7 +71,7 @@ class Bag:
             writer.finish()
 
     def of(self, kind: str, word: str = "") -> list[Message]:
-        """Of a type, on topics that hold a word, by stamp."""
+        """Messages of a type, on topics that hold a word, by stamp; FRAMES as they come."""
         matches = [m for m in self.messages if m.type.endswith(f"/{kind}") and word in m.topic]
         return matches if kind == FRAMES else sorted(matches, key=lambda message: message.stamp)
 
@@ -107,7 +107,7 @@ class Bag:
 
     @property
     def release(self) -> float:
-        """When the force falls fastest [s]."""
+        """Time at which the force falls fastest [s]."""
         size = np.linalg.norm(self.force - self.force[:200].mean(axis=0), axis=1)
         fall = size[:-20] - size[20:]
         return float(self.seconds(self.of(FORCE))[int(fall.argmax()) + 10])

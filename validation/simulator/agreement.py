@@ -30,7 +30,7 @@ SEED = 7
 
 
 def random_thetas(bench: Bench, count: int, seed: int = SEED) -> np.ndarray:
-    """Of the box in params.yaml, shape (count, 5)."""
+    """Random thetas of the box in params.yaml, shape (count, 5)."""
     unit = np.random.default_rng(seed).random((count, 5))
     return SearchBox.of(bench.params.parameters).to_physical(unit)
 

@@ -1,4 +1,4 @@
-"""At rest: pull of a string, bending of beams, torsion of the cylinder, all in closed form."""
+"""Checks at rest: pull of a string, bending of beams, torsion of the cylinder, in closed form."""
 
 from __future__ import annotations
 

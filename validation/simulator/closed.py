@@ -39,7 +39,7 @@ class String:
 
     @classmethod
     def of(cls, sling: ClampedBand, theta, turn_damping: float = 0.0) -> String:
-        """Of THETA's values (5,)."""
+        """Make the string of THETA's values (5,)."""
         coefficients = material(sling, Parameters.of(sling.law, theta))[0].tolist()
         return cls(sling, *list(coefficients)[:4], turn_damping)
 

@@ -50,7 +50,7 @@ else is said.
 
 @dataclass(frozen=True)
 class Figures:
-    """Of one element.
+    """Figures of one element.
 
     Attributes:
         pull: Hold force of each draw over a string's.
@@ -232,7 +232,7 @@ def _known(value: float) -> float | None:
 
 
 def section(bench: Bench) -> Theme:
-    """On the CPU, whatever the other checks run on."""
+    """Compare the rod with tetrahedra on the CPU, whatever the other checks run on."""
     columns = {name: measure(bench, sling) for name, sling in slings(bench.params).items()}
     rod = next(iter(columns.values()))
     details = {

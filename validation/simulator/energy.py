@@ -65,13 +65,13 @@ class Balance:
         return self.hand + self.turning - stored - lost
 
     def share(self, energy: np.ndarray) -> float:
-        """In percent of all of the hand's work, at its largest."""
+        """Largest energy in percent of the hand's work at its largest."""
         return float(100 * np.abs(energy).max() / np.abs(self.hand).max())
 
 
 @dataclass(frozen=True)
 class Remembered:
-    """Of the law `rubber` over steps (S,): what a step's forces need, and where energy is.
+    """Memory of the law `rubber` over steps (S,): what a step's forces need, and where energy is.
 
     Attributes:
         carried, following: As ReferenceRod has them, shape (S, E), (S, 1).
@@ -90,7 +90,7 @@ class Remembered:
 def remembered(
     rod: ReferenceRod, table: np.ndarray, start: np.ndarray, x: np.ndarray
 ) -> Remembered:
-    """Of states (S, L, 9) after steps from `start`, relaxed; steps at rest forget all."""
+    """Memory of states (S, L, 9) after steps from `start`, relaxed; steps at rest forget all."""
     columns = rod.columns(np.concatenate([start[None], x]))
     stress, done = rod.uniaxial(rod.stretch(columns)), rod.pulled(rod.stretch(columns))
     weight, carried = rod.branch, np.zeros((len(x), rod.sling.edges))
@@ -139,7 +139,7 @@ def balance(
     goes_on = np.diff(table["grip"][first:]) == 0  # else forces jump as the step begins
 
     def work(force: np.ndarray) -> np.ndarray:
-        """Of forces (S, ...) at the steps' ends, in each step [J]: by the trapezoid."""
+        """Work of forces (S, ...) at the steps' ends, in each step [J]: by the trapezoid."""
         before = np.where(goes_on[:, None, None], np.roll(force, 1, axis=0), force)
         return ((before + force) / 2 * moved).sum((-2, -1))
 

@@ -1,4 +1,4 @@
-"""Each of the five parameters does what its definition says."""
+"""Checks that each of the five parameters does what its definition says."""
 
 from __future__ import annotations
 

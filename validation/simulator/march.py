@@ -171,7 +171,7 @@ def _downhill(hessian: np.ndarray, slope: np.ndarray) -> np.ndarray:
 
 
 def jacobian(residual, x: np.ndarray) -> np.ndarray:
-    """Of a residual in which a section meets its neighbours only, shape (L, 9, L, 9)."""
+    """Jacobian of a residual in which a section meets its neighbours only, shape (L, 9, L, 9)."""
     sections = len(x)
     probes = np.zeros((3, 9, sections, 9))
     for i in range(sections):

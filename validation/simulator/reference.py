@@ -92,7 +92,7 @@ class ReferenceRod:
         return self.theta.sample()
 
     def value(self, name: str) -> float:
-        """Of a parameter; 0 where the law has none."""
+        """Value of a parameter; 0 where the law has none."""
         return self._values.get(name, 0.0)
 
     @cached_property
@@ -229,7 +229,7 @@ class ReferenceRod:
 
     @staticmethod
     def _spin(f: np.ndarray, stress: np.ndarray, rate: np.ndarray, mu) -> np.ndarray:
-        """Of the frame in which `rate` dissipates least, (..., E, 3); columns lie in axis -2."""
+        """Spin of the frame of least dissipation by `rate`, (..., E, 3); columns lie in axis -2."""
         tau = np.einsum("...km,...kn->...mn", f, stress)
         tau = (tau + np.swapaxes(tau, -1, -2)) / 2
         trace = np.trace(tau, axis1=-2, axis2=-1) + TURNS * np.squeeze(mu)
@@ -256,7 +256,7 @@ class ReferenceRod:
 
     @cached_property
     def _stiffness(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of each joint in bending and in twist [N m], shape (joints,)."""
+        """Stiffness of each joint in bending and in twist [N m], shape (joints,)."""
         sling, middle = self.sling, self.sling.middle
         sizes = [0.0, *sling.edge_lengths[:middle], *([0.0] if self.gripped else [])]
         sizes = np.array([*sizes, *sling.edge_lengths[middle:], 0.0])
@@ -266,7 +266,7 @@ class ReferenceRod:
         return bending * per_length, sling.radius**2 / 4 * per_length
 
     def _joint_forces(self, x, rate, at, bounded: bool) -> np.ndarray:
-        """On the directors of the edges, shape (..., E, 2, 3), the twist linear about `at`."""
+        """Forces on the directors of edges, shape (..., E, 2, 3), the twist linear about `at`."""
         _, _, d, s = self.parameters
         bend, torsion = self._stiffness
         near, moving, turn = (self._frames(at, 1), self._frames(x, 1), self._frames(rate, 0))
@@ -304,7 +304,7 @@ class ReferenceRod:
         return edges + joints.sum(-1) / 2
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Of the stored energy, shape (..., L, 9)."""
+        """Gradient of the stored energy, shape (..., L, 9)."""
         return self._to_sections(
             self.stress(x), self._joint_forces(x, np.zeros_like(x), x, bounded=False)
         )

@@ -23,7 +23,7 @@ ALLOWED = 10  # of 10,000 that did not converge, each marked so
 
 
 def corners(bench: Bench) -> Parameters:
-    """At a bound of the box each, 32."""
+    """The 32 corners of the box, where each parameter is at a bound."""
     unit = np.array(list(product((0.0, 1.0), repeat=len(THETA))))
     box = SearchBox.of(bench.params.parameters)
     return box.parameters(box.to_physical(unit))

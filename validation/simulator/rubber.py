@@ -87,7 +87,7 @@ def drawn_across(
 
 
 def pull(bench: Bench, stretches=(1.2, 1.6, 2.2), shapes=SHAPES) -> list[Measure]:
-    """At rest, drawn so slowly that branches with weight 0 do nothing."""
+    """Check the pull at rest, drawn so slowly that branches with weight 0 do nothing."""
     worst = 0.0
     for shape in shapes:
         sling = _string(bench)
@@ -309,7 +309,7 @@ def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Measure]:
 
 
 def random_points(bench: Bench, count: int) -> Parameters:
-    """Of the box in params.yaml, and BOX of what the law adds."""
+    """Random points of the box in params.yaml, and of BOX for what the law adds."""
     box = SearchBox.of(bench.params.parameters, bounds=BOX, law=RUBBER)
     unit = np.random.default_rng(SEED).random((count, box.dimension))
     return box.parameters(box.to_physical(unit))

@@ -53,7 +53,7 @@ class EvaluationCache:
         return evaluation
 
     def _key(self, theta: np.ndarray) -> str:
-        """Of physical points: another box of the search may hold the same ones."""
+        """Hash physical points: another box of the search may hold the same ones."""
         text = " ".join(self.evaluate.box.names).encode()
         return hashlib.sha256(text + theta.tobytes()).hexdigest()[:32]
 

@@ -65,7 +65,7 @@ class Chamfer:
         return both.mean(axis=2) if self.symmetric else both[:, :, 0]
 
     def errors(self, center_line: np.ndarray | wp.array, device: str) -> wp.array:
-        """Both directions' distances [m], as Warp's float32 (N * K * 2,) on that device."""
+        """Distances in both directions [m], as Warp's float32 (N * K * 2,) on that device."""
         import warp as wp
 
         from pipeline.base.native import empty, launch

@@ -38,7 +38,7 @@ def clouds_kernel(
 
 
 def _cloud_kernel(file: str, **macros: int | str) -> tuple[wp.Kernel, type]:
-    """Of points.h and a text after it, for the arrays of `Chamfer`."""
+    """Make a kernel of points.h and a text after it, and the type of the arrays, for `Chamfer`."""
     floats, integers = wp.array(dtype=wp.float32), wp.array(dtype=wp.int32)
 
     @wp.struct

@@ -143,7 +143,7 @@ class EpisodeLoss:
         )
 
     def terms(self, rollouts: Rollouts) -> dict[str, np.ndarray]:
-        """Each term of N rollouts, shape (N,); NaN or infinite where a rollout is.
+        """Loss terms of N rollouts, each of shape (N,); NaN or infinite where a rollout is.
 
         They are computed on the device that holds the rollouts. A rollout's terms are the same to
         the bit in any batch.
@@ -225,7 +225,7 @@ class EpisodeLoss:
         return 100 * frames.compress(chosen, axis=1).mean(axis=1)
 
     def _filter(self, times: np.ndarray) -> csr_array:
-        """Of forces at simulated times (S,)."""
+        """Filter of forces at simulated times (S,), as the recorded force was filtered."""
         start = float(self.time[0] - self.period / 2)
         with LOCK:
             return _recording_filter(

@@ -60,7 +60,7 @@ PRIORS = {  # mean and standard deviation of Gaussians
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Of D free parameters.
+    """Coordinates of the density, of D free parameters.
 
     Attributes:
         law: Whose parameters they stand for.
@@ -82,7 +82,10 @@ class Coordinates:
 
     @classmethod
     def of_method(cls, params: Params, method: str, sling: ClampedBand) -> Coordinates:
-        """Of a method of params.yaml that searches by least squares, and its band's sling."""
+        """Make the coordinates of a method and its band's sling.
+
+        The method is of params.yaml and searches by least squares.
+        """
         method_params = params.methods[method]
         box = {name: (axis.low, axis.high) for name, axis in params.parameters} | dict(
             method_params.bounds
@@ -106,7 +109,7 @@ class Coordinates:
 
     @property
     def steps(self) -> np.ndarray:
-        """Of finite differences, shape (D,)."""
+        """Steps of finite differences, shape (D,)."""
         return np.array([STEPS[name] for name in self.names])
 
     def prior(self, level: float) -> np.ndarray:
@@ -114,7 +117,7 @@ class Coordinates:
         return self.quantiles(np.repeat([[1 - level], [1 + level]], len(self.names), axis=1) / 2)
 
     def quantiles(self, parts: np.ndarray) -> np.ndarray:
-        """Of each coordinate's prior, even or a Gaussian within its bounds, at parts (N, D)."""
+        """Quantiles of the priors, each even or a Gaussian within its bounds, at parts (N, D)."""
         values = self.low + parts * (self.high - self.low)
         gaussian = self.precision > 0
         mean, spread = self.expected[gaussian], self.precision[gaussian] ** -0.5

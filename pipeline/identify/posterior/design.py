@@ -103,7 +103,7 @@ class PullDesign:
         targets: Sequence[float],
         workers: int = 1,
     ) -> PullDesign:
-        """Of a band of params.yaml that `force` [N] holds at the draw, more or less.
+        """Design for a band of params.yaml that `force` [N] holds at the draw, more or less.
 
         Args:
             method: Of params.yaml, whose law is rubber.
@@ -277,7 +277,7 @@ class _Landings:
         return draws
 
     def gradient(self, phi: np.ndarray, parts: np.ndarray) -> np.ndarray:
-        """Of log landings in the coordinates, shape (N, T, D); NaN where a launch fails."""
+        """Gradient of log landings in the coordinates, (N, T, D); NaN where a launch fails."""
         steps = self.coordinates.steps
         moved = np.vstack([0 * steps, np.diag(steps)])
         n, t, m = *parts.shape, len(moved)
@@ -343,7 +343,7 @@ def candidates(size: float, limits: PullLimits) -> Iterator[Dip]:
 
 
 def _rounded(at: float, depth: float, *times: float) -> Dip:
-    """As one would write it; a time is not less than it is given."""
+    """Round a dip as one would write it; a time is not less than it is given."""
     out, back = (round(np.ceil(time / TICK - 1e-9) * TICK, 2) for time in times)
     return Dip(at=round(at, 2), depth=round(depth, 2), out_time=out, back_time=back)
 

@@ -26,7 +26,7 @@ MOST_ERROR = 0.1  # of a draw [m]
 
 
 def read_evidence(folder: Path, band: str, params: Params) -> list[Observed]:
-    """Of a band, oldest first; none where it has no file.
+    """Read the launches of a band, oldest first; none where it has no file.
 
     A draw without an error of its own has that of a commanded one, `trials.actuation_error`.
 
@@ -38,7 +38,7 @@ def read_evidence(folder: Path, band: str, params: Params) -> list[Observed]:
 
 
 def read_launches(path: Path, error: float | None) -> list[Observed]:
-    """Of a CSV with `COLUMNS`, of which the error may be missing.
+    """Read the launches of a CSV with `COLUMNS`, of which the error may be missing.
 
     Args:
         error: Of a draw without one of its own [m].

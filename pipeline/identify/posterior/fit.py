@@ -130,12 +130,12 @@ def fit(
 
 
 def _size(fit: Fit, step: np.ndarray) -> float:
-    """Of a step (D,), in standard deviations along it: Mahalanobis's distance."""
+    """Length of a step (D,), in standard deviations along it: Mahalanobis's distance."""
     return float(np.sqrt(step @ fit.hessian @ step))
 
 
 def _steps(coordinates: Coordinates, phi: np.ndarray) -> np.ndarray:
-    """Of finite differences, away from the upper bounds, shape (D,)."""
+    """Steps of finite differences, away from the upper bounds, shape (D,)."""
     steps = coordinates.steps
     return np.where(phi + steps > coordinates.high, -steps, steps)
 

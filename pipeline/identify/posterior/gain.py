@@ -1,4 +1,4 @@
-"""By how much the interval of a landing would narrow if something more were known.
+"""Gain of knowing more: how much the interval of a landing would narrow.
 
 Near the mode a landing is linear in what is not known, which is Gaussian: both as the samples of
 the posterior have them. A launch, another pull, or knowing some parameters exactly then changes
@@ -47,7 +47,9 @@ class LandingModel:
         draw: np.ndarray,
         half_width: np.ndarray,
     ) -> LandingModel | None:
-        """From samples (M, P) of θ and the landings (T, S) of some of them; None where any lacks.
+        """Fit the model to samples (M, P) of θ and the landings (T, S) of some of them.
+
+        None without unknowns, with a half width that is not finite, or with too few landings.
 
         Args:
             names: Of the columns of `samples`.

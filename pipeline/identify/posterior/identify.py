@@ -61,7 +61,7 @@ class Identified:
 
     @property
     def parameters(self) -> Parameters:
-        """Of the SAMPLES samples."""
+        """Parameters of the SAMPLES samples."""
         return self.coordinates.parameters(self.samples)
 
     @property
@@ -232,7 +232,7 @@ def confidence(identified: Identified) -> dict:
 
 
 def _priors(identified: Identified) -> dict[str, dict]:
-    """Of what is not fixed: the prior's interval, all else at the mode; if it is identified."""
+    """Priors of what is not fixed: the interval, all else at the mode; and if it is identified."""
     coordinates, result = identified.coordinates, {}
     ends = coordinates.prior(LEVEL)
     widths = np.ptp(

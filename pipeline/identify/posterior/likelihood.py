@@ -67,7 +67,7 @@ class Tolerances:
 
     @classmethod
     def of(cls, episode: Episode) -> Tolerances:
-        """From an episode's metadata, or as usual where it says nothing."""
+        """Read the tolerances from an episode's metadata; the usual ones where it says nothing."""
         preprocessing = episode.metadata.get("preprocessing", {})
         delays = preprocessing.get("delays") or {}
         clocks = {name: delays.get(name) or {} for name in ("camera", "pose")}
@@ -143,7 +143,7 @@ class Expansion:
 
     @property
     def pictures(self) -> list[float]:
-        """When the recoil is seen, from the release [s]."""
+        """Times of the pictures in which the recoil is seen, from the release [s]."""
         seen, episode = self.residuals.frame[self.residuals.recoils], self.residuals.episode
         return (episode.cloud_time[np.unique(seen)] - episode.release_time).tolist()
 
@@ -160,7 +160,7 @@ def _repeated(left: np.ndarray) -> float:
 
 
 def opening_time(episode: Episode, sling: ClampedBand, friction: float) -> float:
-    """In which the simulated pads must open for the force to fall as fast as recorded [s].
+    """Time in which the simulated pads must open for the force to fall as fast as recorded [s].
 
     From the slip on friction falls with the pads' force, which is gone after the opening time: the
     held force is gone sooner, by its share of the friction of closed pads. An episode that does
@@ -184,7 +184,7 @@ class Failed(Exception):
 
 
 class Likelihood:
-    """Of the parameters of a band, by one recording.
+    """Likelihood of the parameters of a band, by one recording.
 
     Attributes:
         episode, sling, cutoff, tolerances: As given; the sling is that of this episode.
@@ -208,7 +208,7 @@ class Likelihood:
         self._frames = _that_count(episode)
 
     def aligned(self, parameters: Parameters) -> Likelihood:
-        """With the camera's clock where these parameters, one sample, show the recoil best.
+        """Copy with the camera's clock where these parameters, one sample, show the recoil best.
 
         A fit that starts a picture away from there can end in another minimum: a picture from
         before the release does not change with the camera's clock. Raises Failed.
@@ -223,7 +223,10 @@ class Likelihood:
         return moved
 
     def with_wider_tolerances(self, expansion: Expansion) -> Likelihood:
-        """With force and recoil as sure as the law can follow them, by what a fit left of them."""
+        """Copy with force and recoil as sure as the law can follow them.
+
+        Their tolerances are what a fit left of them, where that is more.
+        """
         wider = copy(self)
         force = max(self.tolerances.force, expansion.discrepancy)
         way = max(self.tolerances.way, expansion.recoil_discrepancy)

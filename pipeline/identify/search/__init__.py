@@ -1,1 +1,1 @@
-"""Who proposes parameters: the loop, its history, regions and optimisers."""
+"""Search for parameters: the loop, its history, regions and optimisers."""

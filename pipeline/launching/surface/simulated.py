@@ -14,7 +14,7 @@ from pipeline.launching.surface.response_surface import (
 
 
 class SimulatedLandings:
-    """In the place of a `ResponseSurface`: each draw is launched in the simulator.
+    """Landings in the place of a `ResponseSurface`: each draw is launched in the simulator.
 
     Attributes:
         reasons: Names of the failure codes, more with each new one; code 0 is success.

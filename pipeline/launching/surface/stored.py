@@ -21,7 +21,10 @@ class Training(JsonRecord):
 
 
 class MapError(JsonRecord):
-    """Of reading between simulated launches, on so many random draws [m]; None where none lands."""
+    """Error of reading between simulated launches, on so many random draws [m].
+
+    None where none lands.
+    """
 
     draws: int
     mean_error_m: float | None
@@ -38,7 +41,7 @@ class Projectile(JsonRecord):
 
 
 class Card(JsonRecord):
-    """As much of a policy's card (policy/export.py) as is read."""
+    """The part of a policy's card (policy/export.py) that is read."""
 
     training: Training
     landing_map: LandingMapErrors

@@ -108,7 +108,7 @@ class ReleaseFrames:
 
     @staticmethod
     def _aged(since: float) -> float:
-        """From 0 of a new picture or cloud to 1."""
+        """Age of a picture or cloud, from 0 of a new one to 1 after AGED."""
         return float(np.clip(since / AGED, 0, 1))
 
     @cached_property
@@ -147,7 +147,7 @@ def _milliseconds(since: float) -> str:
 
 
 def _pixels() -> float:
-    """For a metre."""
+    """Number of pixels for a metre."""
     return WIDE / (REACH[1] - REACH[0])
 
 

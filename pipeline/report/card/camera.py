@@ -38,7 +38,7 @@ class Pictures:
 
     @classmethod
     def of(cls, path: Path, episode: Episode, setup: SetupParams) -> Pictures:
-        """Of the recording that an episode was made from.
+        """Read the pictures of the recording that an episode was made from.
 
         Raises:
             NotMade: It is not there.
@@ -74,6 +74,6 @@ class Pictures:
 
 
 def _applied(episode: Episode, name: str) -> float:
-    """By what the stamps of pose or camera were late that became the episode's [s]."""
+    """Delay of the stamps of pose or camera that was taken off for the episode [s]."""
     delay = (episode.metadata["preprocessing"].get("delays") or {}).get(name) or {}
     return delay["value"] if delay.get("applied") else 0.0

@@ -18,7 +18,7 @@ WIDTH, GLOW, LIGHT = 2, 2, 0.5  # pixels; of a light line, wider by GLOW, that s
 
 
 def bgr(color: str) -> tuple[int, int, int]:
-    """Of #rrggbb."""
+    """Blue, green and red of #rrggbb."""
     blue, green, red = (int(color[place : place + 2], 16) for place in (5, 3, 1))
     return blue, green, red
 
@@ -46,7 +46,7 @@ class CameraView:
         size: tuple[int, int],
         begin: float | None = None,
     ) -> CameraView:
-        """Of `size`, around the simulated band from `begin` [s] (its release) on, and the hand."""
+        """View of `size` on the simulated band from `begin` [s] (its release) on, and the hand."""
         release = simulated.release
         times = np.linspace(release + AROUND[0], release + AROUND[1], STEPS)
         times = times if begin is None else np.append(times, np.linspace(begin, release, STEPS))

@@ -105,7 +105,7 @@ def force(episode: Episode, simulated: Simulated) -> Figure:
 
 @picture(dpi=110)
 def values(shown: list[ShownValue], boxes: dict[str, SearchedRange]) -> Figure:
-    """Each searched value's interval as a bar within its box, which is given by name."""
+    """Plot each searched value's interval as a bar within its box, which is given by name."""
     rows = [value for value in shown if value.name in boxes and value.low is not None]
     figure, ax = plt.subplots(figsize=(WIDTH, 0.62 * max(len(rows), 1) + 0.9))
     for row, quantity in enumerate(rows):

@@ -24,7 +24,7 @@ SIDE = 0.01  # of a box's width: as near is at its side
 
 
 def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
-    """Of a band, from files and launches.
+    """Findings of a band, from files and launches.
 
     Args:
         force: Of the first pull, simulated, at its samples [N], shape (T, 3).
@@ -106,7 +106,7 @@ def _known(value: float) -> float:
 
 
 def _density(params: Params, band: str) -> float | None:
-    """Of a band that somebody weighed [kg/m^3]."""
+    """Density of a band that somebody weighed [kg/m^3]; None for the rig's."""
     sizes = params.bands[band]
     return None if sizes.source == "rig" else sizes.density
 

@@ -48,13 +48,13 @@ class Aims:
 
     @property
     def half_width(self) -> np.ndarray:
-        """Of the intervals [m], shape (T,)."""
+        """Half widths of the intervals [m], shape (T,)."""
         return np.diff(self.interval, axis=1)[:, 0] / 2
 
 
 @dataclass(frozen=True)
 class CardInputs:
-    """Of one band by one method.
+    """Inputs of the card of one band by one method.
 
     Attributes:
         episodes: Of all its pulls; pictures show the first.

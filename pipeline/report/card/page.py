@@ -134,7 +134,7 @@ def _seconds(times: np.ndarray) -> list[float]:
 
 
 def thinned(cloud: np.ndarray, most: int) -> np.ndarray:
-    """At most so many points of a cloud, evenly from its order, shape (N, 3)."""
+    """Thin a cloud to at most so many points, evenly from its order, shape (N, 3)."""
     if len(cloud) > most:
         cloud = cloud[np.linspace(0, len(cloud) - 1, most).round().astype(int)]
     return np.reshape(cloud, (-1, 3))

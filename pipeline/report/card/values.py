@@ -35,7 +35,7 @@ class ShownValue:
 
 
 def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
-    """Of a θ file's content, in the order of QUANTITIES.
+    """Values of a θ file's content, in the order of QUANTITIES.
 
     Args:
         fixed: Parameters that the method did not search.
@@ -70,7 +70,7 @@ class SearchedRange(NamedTuple):
     scale: str = "linear"
 
     def place(self, value: float) -> float:
-        """From 0 at the lower end to 1 at the upper one."""
+        """Place of a value in the range, from 0 at the lower end to 1 at the upper one."""
         ends = np.array([value, self.low, self.high], float)
         if self.scale == "log":
             ends = np.log(ends)
@@ -78,7 +78,7 @@ class SearchedRange(NamedTuple):
 
 
 def boxes(params: Params, method: str) -> dict[str, SearchedRange]:
-    """Of what a method searches, by name."""
+    """Ranges of what a method searches, by name."""
     config = params.methods[method]
     ranges = {name: SearchedRange(box.low, box.high, box.scale) for name, box in params.parameters}
     ranges |= {name: SearchedRange(*ends) for name, ends in config.bounds.items()}

@@ -169,7 +169,7 @@ def inside(findings: Findings) -> str:
 
 
 def launches_of(count: int, kind: str = "") -> str:
-    """In words: one launch is called that."""
+    """Number of launches in words, in the singular for one."""
     return " ".join(filter(None, [str(count), kind, "launch" if count == 1 else "launches"]))
 
 

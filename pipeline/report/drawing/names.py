@@ -8,7 +8,7 @@ from pipeline.base.errors import printable
 
 
 def as_code(name: str) -> str:
-    """As code, whatever is in it: no markup of it counts."""
+    """Write a name as code, whatever is in it: no markup of it counts."""
     shown = printable(name)
     fence = "`" * (1 + max(map(len, re.findall("`+", shown)), default=0))
     return f"{fence} {shown} {fence}" if "`" in shown else f"{fence}{shown}{fence}"
@@ -21,10 +21,10 @@ def as_text(words: str) -> str:
 
 
 def cell(text: str) -> str:
-    """In a table, where a bar would end the cell, in code too."""
+    """Escape text for a table, where a bar would end the cell, in code too."""
     return text.replace("|", "\\|")
 
 
 def as_label(name: str) -> str:
-    """As matplotlib draws it letter by letter: between dollars it would read TeX."""
+    """Escape a name for matplotlib to draw letter by letter: between dollars it would read TeX."""
     return printable(name).replace("$", r"\$")

@@ -92,7 +92,7 @@ def difference(first: pd.DataFrame, second: pd.DataFrame, seed: int) -> Differen
 
 
 def _freedom(change: list[tuple]) -> float:
-    """Of Student's t, by Welch and Satterthwaite: targets may spread differently."""
+    """Degrees of freedom of Student's t (Welch, Satterthwaite): targets may spread differently."""
     some = [part for parts in change for part in parts if len(part) > 1]
     shares = np.array([part.var(ddof=1) / len(part) for part in some])
     degrees = sum(share**2 / (len(part) - 1) for share, part in zip(shares, some, strict=True))

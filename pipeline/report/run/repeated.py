@@ -31,7 +31,7 @@ class MeanInterval:
 
 @dataclass(frozen=True)
 class Against:
-    """By how much a method misses more than the paper's on the same recordings [cm].
+    """Distance by which a method misses more than the paper's on the same recordings [cm].
 
     Attributes:
         p: Of Wilcoxon's signed-rank test, with Holm's correction.
@@ -111,7 +111,7 @@ def _settings(settings: dict) -> dict[str, Any]:
 
 
 def _intervals(methods: dict) -> dict[str, MeanInterval]:
-    """Of the methods that have a mean."""
+    """Mean misses of the methods that have a mean, with intervals."""
     return {
         name: _interval(of_method["miss_cm"])
         for name, of_method in methods.items()

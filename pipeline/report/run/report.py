@@ -40,7 +40,7 @@ class Report:
 
     @classmethod
     def of(cls, params: Params, root: Path) -> Report:
-        """Of everything in params.run. Raises UserError where an input is missing."""
+        """Report on everything in params.run. Raises UserError where an input is missing."""
         results = gather(params, root)
         named = styles(dict.fromkeys(result.method for result in results))
         replays = {band: _replays(params, results, band) for band in params.run.bands}
@@ -89,7 +89,7 @@ def references(params: Params) -> tuple[str, ...]:
 
 
 def _replays(params: Params, results: Results, band: str) -> dict[str, MethodReplay]:
-    """Of the methods that are drawn; of all where held-out data are to be compared."""
+    """Replays of the methods that are drawn; of all where held-out data are to be compared."""
     recorded, methods = results.episodes[band], results.methods[band]
     some = drawn(params.run.methods)
     return {

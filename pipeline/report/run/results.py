@@ -27,7 +27,7 @@ class FloorOfTarget(JsonRecord):
 
 
 class Floor(FloorOfTarget):
-    """As much of what stages/floor.py wrote as is shown."""
+    """The part of what stages/floor.py wrote that is shown."""
 
     launches: int
     actuation_error_m: float

@@ -82,7 +82,7 @@ def say(line: str) -> None:
 
 
 def ended(copy: StruckCopy, expected: dict) -> dict[str, bool]:
-    """At the end of a round: how what is there compares with the undisturbed run's."""
+    """Compare what is there at the end of a round with the undisturbed run's."""
     copies = copy.copies
     caches = [folder / ".dvc/cache" for folder in copies] + [copy.disk / "remote"]
     fresh = copy("dvc", "status", *copy.stages)

@@ -96,7 +96,7 @@ class StruckCopy(ProjectCopy):
         return []
 
     def begin(self) -> None:
-        """From scratch: as nothing had ever run here."""
+        """Start from scratch, as if nothing had ever run here."""
         shutil.rmtree(self.folder, ignore_errors=True)
         source = Path(self.environment[OF_CAMPAIGN], SOURCE)
         shutil.copytree(source, self.folder, symlinks=True)

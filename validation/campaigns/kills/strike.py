@@ -19,7 +19,7 @@ ENDED = 1200.0  # s that a command may take without further kills
 
 
 def chance(copy: StruckCopy, number: int, seed: int) -> np.random.Generator:
-    """Of an attempt, by its number."""
+    """Random numbers of an attempt, by its number."""
     return np.random.default_rng([seed, number, *copy.name.encode()])
 
 

@@ -28,7 +28,9 @@ POLISH_STEPS = 20  # of L-BFGS on the whole batch
 
 
 class Bayes:
-    """Each round asks for `population` points, chosen together by qLogExpectedImprovement.
+    """Optimiser that asks each round for `population` points, chosen together.
+
+    The choice is by qLogExpectedImprovement.
 
     The model is a SingleTaskGP with BoTorch's priors (Hvarfner et al. 2024) and an exponential
     kernel (Matern 1/2), a length scale an axis: losses are means of norms, whose valley is a kink,

@@ -13,7 +13,7 @@ class Design:
     phase = "design"
 
     def __init__(self, dimension: int, *, rollouts: int, seed: int, population: int) -> None:
-        """Of `rollouts` points; `population` is not used."""
+        """Make a Latin hypercube of `rollouts` points; `population` is not used."""
         self._points = latin_hypercube(dimension, rollouts, seed)
 
     def ask(self) -> np.ndarray:

@@ -84,7 +84,7 @@ def _predictions(report: Report) -> str | None:
 
 
 def _convergence(report: Report) -> str | None:
-    """Of the methods that minimise one loss, and of the main one; where a band has several."""
+    """Picture of the searches on one loss, and of the main one; None where no band has several."""
     searches = {
         band: {
             method: result
@@ -101,7 +101,7 @@ def _convergence(report: Report) -> str | None:
 
 
 def _corner(report: Report) -> dict[str, str] | None:
-    """Of the first search that refines regions, where one did."""
+    """Picture of all θ of the first search that refines regions; None where none did."""
     result = next((searched for searched in report.results if searched.regions), None)
     if result is None:
         return None

@@ -56,7 +56,7 @@ def _overview(report: Report, draws: dict[tuple[str, str], np.ndarray]) -> str |
 
 
 def _search(report: Report) -> tuple[str, str] | None:
-    """By which method, and its picture."""
+    """Name of the method of the search that is drawn, and its picture; None where there is none."""
     if report.landscape is None:
         return None
     result, chart = report.landscape
@@ -66,7 +66,7 @@ def _search(report: Report) -> tuple[str, str] | None:
 
 
 def _flights(report: Report, shown: Styles) -> tuple[str, str] | None:
-    """On the first band whose flights are known, and their picture."""
+    """The first band whose flights are known, and their picture; None where there is none."""
     for band, methods in report.results.methods.items():
         trials = pd.concat([result.trials for result in methods.values()], ignore_index=True)
         flew = set(trials.loc[trials.flight_y.notna()].method)

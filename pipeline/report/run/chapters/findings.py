@@ -164,7 +164,7 @@ def _claim(report: Report, rows: list[Compared], claim: str, methods: tuple[str,
 
 
 def _by(rows: list[Compared], words: str) -> str:
-    """As in " by 2.9 to 4.4 cm"; empty where no launches can be compared."""
+    """Write differences as in " by 2.9 to 4.4 cm"; empty where no launches can be compared."""
     differences = [row.beside[paper.METHOD] for row in rows]
     sizes = [100 * abs(difference.mean) for difference in differences if difference is not None]
     return f"{words} {_between(sizes)} cm" if sizes else ""
@@ -219,12 +219,12 @@ def _wrong(result: Result) -> list[str]:
 
 
 def _between(values: list[float], form: str = ".1f") -> str:
-    """As in "1.0 to 2.6", or one number where they are the same."""
+    """Write a range as in "1.0 to 2.6", or one number where they are the same."""
     ends = dict.fromkeys(format(end, form).replace("-", "−") for end in (min(values), max(values)))
     return " to ".join(ends)
 
 
 def _list(words) -> str:
-    """As in "a, b and c"."""
+    """Write a list as in "a, b and c"."""
     *most, last = words
     return f"{', '.join(most)} and {last}" if most else last

@@ -22,7 +22,7 @@ SLACK, MARGIN = 0.05, 0.04  # of the peak force, below which the band is slack; 
 def pull(
     episodes: dict[str, Episode], replays: dict[str, dict[str, MethodReplay]], styles: Styles
 ) -> Figure:
-    """By band: force against draw, and beside it residual force and distance of the clouds.
+    """Plot by band force against draw, and beside it residual force and distance of the clouds.
 
     Args:
         replays: By band and method; none shows the recordings alone.

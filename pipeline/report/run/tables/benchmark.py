@@ -149,12 +149,12 @@ def spread(errors: LandingErrors | None) -> str:
 
 
 def band_name(band: str) -> str:
-    """As the paper calls the band that ours imitates, or its own name."""
+    """Name that the paper gives the band that ours imitates, or its own name."""
     return paper.BANDS.get(band, band)
 
 
 def method_name(method: str, styles: Styles) -> str:
-    """For readers."""
+    """Name of a method for readers."""
     return method if method == FLOOR else styles[method].name
 
 

@@ -32,7 +32,10 @@ HEAD = "% Needs booktabs and graphicx. Written by the last stage of `dvc repro`.
 
 
 def markdown(table: Table | None, repeats: bool = True) -> str:
-    """As markdown; without `repeats`, first cells that repeat those above are blank. "" of None."""
+    """Write a table as markdown; "" of None.
+
+    Without `repeats`, first cells that repeat those above are blank.
+    """
     if table is None:
         return ""
     heads, rows = table

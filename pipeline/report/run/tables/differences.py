@@ -17,7 +17,7 @@ from pipeline.report.run.tables.landings import LAUNCHED, of_kind
 
 
 class Compared(NamedTuple):
-    """By how much a method's launches of a kind miss more than those of each reference."""
+    """Differences by which a method's launches of a kind miss more than those of each reference."""
 
     band: str
     method: str
@@ -54,7 +54,7 @@ def as_table(rows: list[Compared], styles: Styles) -> Table:
 
 
 def shown(against: Difference | None) -> str:
-    """As in "+3.20 (+2.10 to +4.40)"."""
+    """Write a difference as in "+3.20 (+2.10 to +4.40)"."""
     if against is None:
         return "N/A"
     text = _signed(against.mean)

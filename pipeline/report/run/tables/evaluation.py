@@ -48,7 +48,7 @@ def _share(hit) -> str:
 def sensitivity(
     results: Results, draws: Mapping[tuple[str, str], np.ndarray], styles: Styles
 ) -> Table:
-    """By how much a landing moves for a draw that is 1 cm off, in the worst direction.
+    """Table of how far a landing moves for a draw that is 1 cm off, in the worst direction.
 
     Args:
         draws: By band and method, of the policy for evenly spread targets [m], shape (N, 2).
@@ -94,7 +94,7 @@ class Hanging:
 
 
 def hanging(params: Params, results: Results, methods: tuple[str, ...]) -> list[Hanging]:
-    """Of every band: the rig's rubber where it is known, then the methods that ran."""
+    """Rows of every band: the rig's rubber where it is known, then the methods that ran."""
     rows = []
     for band, ran in results.methods.items():
         rest = params.bands[band].rest_length / 2

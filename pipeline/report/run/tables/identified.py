@@ -51,7 +51,7 @@ def methods(results: Results, params: Params, styles: Styles) -> Table:
 
 
 def _held(name: str, value: float) -> str:
-    """As in "d 5.00 ms"."""
+    """Write a fixed parameter as in "d 5.00 ms"."""
     return f"{QUANTITIES[name].symbol} {exactly(name, value)} {QUANTITIES[name].unit}".rstrip()
 
 

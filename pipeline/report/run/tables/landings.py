@@ -44,7 +44,7 @@ class LandingErrors:
 
 
 def landing_errors(trials: pd.DataFrame) -> dict[float | str, LandingErrors]:
-    """Of launches that had targets: by target, and under "all" over every target."""
+    """Landing errors of launches that had targets: by target, and over every target under "all"."""
     trials = trials.loc[trials.target.notna()]
     good = landed(trials)
 
@@ -138,7 +138,7 @@ class Coverage:
 
 
 def prediction_error(trials: pd.DataFrame) -> dict[str, PredictionError]:
-    """By "inside" and "beyond" the recorded stretch, and "all"."""
+    """Prediction errors "inside" and "beyond" the recorded stretch, and of "all"."""
     signed = trials.predicted_y / trials.landing_y - 1
     error = signed.abs()
     return {
@@ -155,7 +155,7 @@ def prediction_error(trials: pd.DataFrame) -> dict[str, PredictionError]:
 
 
 def intervals(trials: pd.DataFrame) -> dict[str, Coverage] | None:
-    """Of launches with landing and interval, by the same keys; None where none has an interval."""
+    """Coverage of launches with landing and interval, by the same keys; None without intervals."""
     if trials.predicted_low.isna().all():
         return None
     both = trials.predicted_low.notna() & trials.landing_y.notna()

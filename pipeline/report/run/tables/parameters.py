@@ -159,7 +159,7 @@ def exactly(name: str, value: float) -> str:
 
 
 def _physical(name: str, value: float, digits: int = 2) -> str:
-    """As in 929, 11.1, 0.46: one digit more where there is a unit, or so many after the point."""
+    """Text as in 929, 11.1, 0.46: a digit more with a unit, else so many after the point."""
     quantity = QUANTITIES[name]
     value *= quantity.factor
     if quantity.unit and value:

@@ -49,7 +49,7 @@ def name_of(method: str) -> str:
 
 
 def difference(against: Against | None) -> str:
-    """As in "+3.2 (+1.1 to +5.0)", bold where it counts."""
+    """Write a difference as in "+3.2 (+1.1 to +5.0)", bold where it counts."""
     if against is None:
         return NONE
     text = f"{against.mean:+.1f} ({against.low:+.1f} to {against.high:+.1f})".replace("-", "−")

@@ -40,6 +40,10 @@ PROSE = {
     r"\bturn(s|ed)? them round\b": "reverse",
     r"\btook part in nothing\b": "held-out",
 }
+BEGINNINGS = {  # of no docstring outside the tests: it begins with what is done, or what there is
+    *("As", "At", "Both", "By", "Each", "For", "From", "If", "In", "Of", "On", "That", "Those"),
+    *("To", "When", "Who", "With"),
+}
 PYTHON, TEXT = "*.py", ("README.md", "CONTRIBUTING.md", "docs/*.md", "*.j2")
 
 
@@ -75,6 +79,15 @@ def variables(text: str) -> Iterator[tuple[int, str]]:
             yield node.lineno, node.arg
 
 
+def docstrings(text: str) -> Iterator[tuple[int, str]]:
+    """Line and first word of each docstring that does not begin with a sentence's subject or verb."""
+    kinds = ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef
+    for node in ast.walk(ast.parse(text)):
+        words = isinstance(node, kinds) and (ast.get_docstring(node) or "").split()
+        if words and words[0].strip(",.:;`") in BEGINNINGS:
+            yield getattr(node, "lineno", 1), words[0]
+
+
 def phrases(text: str) -> Iterator[tuple[int, str, str]]:
     """Line, phrase and what to write instead, of prose that is not to be used."""
     for pattern, better in PROSE.items():
@@ -91,6 +104,11 @@ def main() -> int:
         wrong += [f"{place}:{line}: {word}: {NAMES[word]}" for line, word in names(text)]
         wrong += [f"{place}:{line}: {words}: {better}" for line, words, better in phrases(text)]
         wrong += [f"{place}:{line}: {word}: {VAGUE[word]}" for line, word in variables(text)]
+        if place.parts[0] != "tests":
+            wrong += [
+                f"{place}:{line}: {word} ...: what it does, or what it is"
+                for line, word in docstrings(text)
+            ]
     for path in tracked(*TEXT):
         text, place = path.read_text(encoding="utf-8"), path.relative_to(ROOT)
         wrong += [f"{place}:{line}: {words}: {better}" for line, words, better in phrases(text)]

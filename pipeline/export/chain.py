@@ -113,11 +113,11 @@ class SpringChain:
 
     @property
     def damping(self) -> float:
-        """Of a spring [N s/m]."""
+        """Damping of a spring [N s/m]."""
         return self.strength * self.damping_time / self.spring_length
 
     def pull(self, strain: np.ndarray | float) -> np.ndarray:
-        """Of a spring at rest [N], like `strain`."""
+        """Pull of a spring at rest [N], like `strain`."""
         return self.strength / 3 * uniaxial(1 + np.maximum(strain, 0.0), self.mooney_share)
 
     @property

@@ -36,7 +36,7 @@ class DrawCompared:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Of the target's, relative."""
+        """Relative errors of the target's values."""
         pairs = {name: getattr(self, name) for name in ("hold_force", "speed", "landing")}
         return {name: theirs / ours - 1 for name, (ours, theirs) in pairs.items()}
 

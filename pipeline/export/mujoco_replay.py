@@ -52,7 +52,7 @@ class MujocoBand:
 
     @property
     def force(self) -> np.ndarray:
-        """Of the band on the hand in the last step, shape (3,)."""
+        """Force of the band on the hand in the last step, shape (3,)."""
         return self.data.qfrc_constraint[self._hand]
 
     def key(self) -> dict[str, np.ndarray]:
@@ -74,11 +74,11 @@ class MujocoBand:
 
     @property
     def finer(self) -> MujocoBand:
-        """With half the time step."""
+        """The same replay with half the time step."""
         return MujocoBand(replace(self.chain, step=self.chain.step / 2))
 
     def launches(self, draws: np.ndarray, *, fly: bool = False) -> list[Shot]:
-        """As ChainReplay.launches."""
+        """Launch as ChainReplay.launches does."""
         return [self.launch(draw, fly=fly) for draw in draws]
 
     def launch(self, draw, *, fly: bool = False) -> Shot:
@@ -119,7 +119,7 @@ class MujocoBand:
         return before[1] + part * (after[1] - before[1])
 
     def pull(self, path: HandPath, times: np.ndarray, stamps: np.ndarray) -> Pulled:
-        """As ChainReplay.pull."""
+        """Pull as ChainReplay.pull does."""
         self.hang()
         gain, brake = STIFF, 2 * np.sqrt(STIFF * HAND_MASS)
         before = self.model.actuator_gainprm.copy(), self.model.actuator_biasprm.copy()

@@ -34,7 +34,7 @@ LOOK = 50  # steps, an even number, between two looks at what has left and lande
 
 @wp.struct
 class Numbers:
-    """Of all bands alike: see the JSON file."""
+    """Numbers of all bands alike: see the JSON file."""
 
     edges: int
     rest: float
@@ -244,7 +244,7 @@ class SpringBands:
 
     @property
     def force(self) -> np.ndarray:
-        """Of the bands on their hands in the last step, shape (N, 3)."""
+        """Force of the bands on their hands in the last step, shape (N, 3)."""
         return self._on_hand.numpy().astype(float)
 
     def run(self, steps: int) -> None:

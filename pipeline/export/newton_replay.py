@@ -43,7 +43,7 @@ class NewtonReplay:
 
     @property
     def finer(self) -> NewtonReplay:
-        """With half the time step."""
+        """The same replay with half the time step."""
         return NewtonReplay(replace(self.chain, step=self.chain.step / 2))
 
     def launches(self, draws: np.ndarray, *, fly: bool = True) -> list[Shot]:
@@ -56,7 +56,7 @@ class NewtonReplay:
         return [Shot(*row) for row in columns.tolist()]
 
     def pull(self, path: HandPath, times: np.ndarray, stamps: np.ndarray) -> Pulled:
-        """As ChainReplay.pull."""
+        """Pull as ChainReplay.pull does."""
         bands, middle = self._module.SpringBands(self._numbers), self.chain.edges // 2
         bands.put([self.chain.hanging()], held=False)
         bands.settle(HANG)

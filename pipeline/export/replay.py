@@ -41,7 +41,7 @@ class ChainReplay(Protocol):
 
     @property
     def finer(self) -> ChainReplay:
-        """With half the time step."""
+        """The same replay with half the time step."""
         ...
 
     def launches(self, draws: np.ndarray, *, fly: bool = False) -> list[Shot]:

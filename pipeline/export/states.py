@@ -1,4 +1,4 @@
-"""For which states a match holds: what other pauses and earlier draws do to the calibrated band.
+"""States for which a match holds: what other pauses and earlier draws do to the calibrated band.
 
 Springs have no memory. They are matched to a band that was drawn as far as the recording before,
 in the recording's time, and let go after its pause. The band itself relaxes and softens; by how

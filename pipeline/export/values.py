@@ -17,7 +17,7 @@ FRAMES = (
 
 
 def values(model: CalibratedBand) -> list[dict]:
-    """Each parameter with its 90 % interval where one is known: name, value, unit, low, high."""
+    """List each parameter with its 90 % interval where one is known: name, value, unit, low, high."""
     intervals, rows = getattr(model, "intervals", {}), []
     theta = model.parameters.sample()
     for name in QUANTITIES:
@@ -57,7 +57,7 @@ def sizes(model: CalibratedBand) -> dict[str, float | list[float] | None]:
 
 
 def history(model: CalibratedBand) -> dict[str, float] | None:
-    """In how long the hand must draw, and how long it must wait; None: it does not matter."""
+    """Times in which the hand must draw, and must wait; None: they do not matter."""
     pull_history = model.launch_setup.history
     return pull_history and {
         "pull_time_s": rounded(pull_history.pull_time, 6),

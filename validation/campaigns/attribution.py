@@ -205,7 +205,7 @@ def performed(job: VariantJob, work: Path, orange: Path | None) -> dict:
 
 
 def figures(lines: list[dict]) -> dict:
-    """By group and pull, each method's `together`, and the mean errors of each band."""
+    """Figures by group and pull: each method's `together`, and the mean errors of each band."""
     result: dict = {}
     for group, pull in COLUMNS:
         some = [line for line in lines if (line["group"], line["pull"]) == (group, pull)]

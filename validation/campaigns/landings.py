@@ -69,7 +69,7 @@ BOOTSTRAP = 2000
 
 @dataclass(frozen=True)
 class OneRecording:
-    """Of a band, and how it is identified.
+    """A recording of a band, and how it is identified.
 
     Attributes:
         worn: It was drawn before.
@@ -115,7 +115,7 @@ SETS = {
 
 
 def jobs(name: str, most: int = TEN, pulls: Sequence[str] = PULLS) -> list[OneRecording]:
-    """At most so many recordings of each band of a set by each pull, worn ones once."""
+    """List at most so many recordings of each band of a set by each pull, worn ones once."""
     if name == ONE_DIP:
         numbers, bands = range(min(RECORDINGS, most)), (*SETS["develop"][1], *BANDS)
         return [OneRecording(DEVELOP, band, ONE_DIP, False, n) for n in numbers for band in bands]
@@ -182,7 +182,7 @@ def performed(job: OneRecording, work: Path, keep: bool) -> dict:
 
 
 def figures(lines: list[dict]) -> dict:
-    """By kind of recording: each band's `summary`, and what they say together."""
+    """Figures by kind of recording: each band's `summary`, and what they say together."""
     result: dict = {}
     kinds = {id(line): job_of(line).kind for line in lines}
     for kind in sorted(set(kinds.values())):

@@ -130,7 +130,7 @@ VARIANTS: dict[str, Callable[[Variant], Variant]] = {
 
 
 def measured(engine: Engine, variant: Variant, launches: list[dict], stiffness) -> list[dict]:
-    """Each draw of the calibrated simulation, held by a variant in PhysX."""
+    """Hold each draw of the calibrated simulation by a variant in PhysX."""
     rows = []
     for launch in launches:
         draw, ours = np.array(launch["draw_m"]), launch["hold_force_n"]

@@ -62,7 +62,7 @@ def fitted(engine: Engine, model: CalibratedBand, band: UsdBand) -> UsdBand:
 
 
 def changed(band: UsdBand, point: np.ndarray) -> UsdBand:
-    """With modulus and mass times e to `point` (2,)."""
+    """The band with modulus and mass times e to `point` (2,)."""
     young, mass = np.exp(point)
     tube = replace(band.tube, mass=mass * band.tube.mass)
     return replace(band, tube=tube, young=young * band.young)
@@ -81,7 +81,7 @@ def _least(grid: np.ndarray, errors: np.ndarray) -> np.ndarray:
 def _errors(
     engine: Engine, model: CalibratedBand, band: UsdBand, draws, ours: Launches, grid: np.ndarray
 ) -> np.ndarray:
-    """Of held forces and landings over what is asked, at points (P, 2) of one mass: (P, 2 N)."""
+    """Errors over what is asked, of forces and landings, at points (P, 2) of one mass: (P, 2 N)."""
     count = len(draws)
     heavy = changed(band, np.array([0.0, grid[0, 1]]))
     youngs = np.repeat(band.young * np.exp(grid[:, 0]), count)

@@ -80,7 +80,7 @@ def variables(text: str) -> Iterator[tuple[int, str]]:
 
 
 def docstrings(text: str) -> Iterator[tuple[int, str]]:
-    """Line and first word of each docstring that does not begin with a sentence's subject or verb."""
+    """Line and first word of each docstring that begins as no sentence does."""
     kinds = ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef
     for node in ast.walk(ast.parse(text)):
         words = isinstance(node, kinds) and (ast.get_docstring(node) or "").split()

@@ -82,7 +82,7 @@ def legs_of(plan: Path) -> tuple[list[Leg], Leg]:
 
 
 def openings(plan: Path) -> list[tuple[float, float]]:
-    """When the fingers are commanded [s], and to which distance [m], by gripper.json."""
+    """Times at which the fingers are commanded [s], and their distances [m], by gripper.json."""
     commands = []
     for load in json.loads((plan / "gripper.json").read_text()):
         at, gap = load["time_from_start"], 2 * load["command"]["position"]

@@ -17,7 +17,7 @@ FRAMES = (
 
 
 def values(model: CalibratedBand) -> list[dict]:
-    """List each parameter with its 90 % interval where one is known: name, value, unit, low, high."""
+    """List parameters with their 90 % intervals where known: name, value, unit, low, high."""
     intervals, rows = getattr(model, "intervals", {}), []
     theta = model.parameters.sample()
     for name in QUANTITIES:

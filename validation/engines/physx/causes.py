@@ -81,12 +81,6 @@ def with_rate(variant: Variant, rate: int) -> Variant:
     return replace(changed, steps=replace(variant.steps, rate=rate))
 
 
-def with_mass(variant: Variant, factor: float) -> Variant:
-    tube = replace(variant.band.tube, mass=factor * variant.band.tube.mass)
-    changed = with_property(variant, "omniphysics:mass", f"{tube.mass.sum():.9g}")
-    return replace(changed, band=replace(variant.band, tube=tube))
-
-
 def opened_bent(variant: Variant) -> Variant:
     """The stage's `points` are where the band hangs; it is at rest as it was."""
     places = variant.band.tube.clamped.reshape(-1, 3)
@@ -125,7 +119,6 @@ VARIANTS: dict[str, Callable[[Variant], Variant]] = {
     "256 iterations": lambda v: with_property(v, ITERATIONS, 256),
     "1,000 steps a second": partial(with_rate, rate=1000),
     "drawn and held three times as long": lambda v: replace(v, steps=Steps(times=(1.0, 6.0, 3.0))),
-    "four times the mass": partial(with_mass, factor=4.0),
 }
 
 

@@ -99,7 +99,7 @@ class Flight:
         return self.lanes["outcome"] == Outcome.GOING_ON
 
     def _part(self, parts: np.ndarray, force: np.ndarray) -> None:
-        """Store where those that part (N,) have left: in the last step, where nothing pushes any more."""
+        """Store where those that part (N,) left, in the last step, when nothing pushes any more."""
         pushes = [(vector * self.direction).sum(axis=1) for vector in (self.last, force)]
         w = (pushes[0] / np.maximum(pushes[0] - pushes[1], 1e-9)).clip(0, 1)[:, None]
         change = (w - 0.5) * self.last + (w**2 - 0.25) / 2 * (force - self.last)

@@ -46,9 +46,6 @@ def test_what_a_variant_says_of_itself_is_in_its_stage(stage):
     assert fast.steps.rate == 1000 and "timeStepsPerSecond = 1000" in fast.text
     assert "solverPositionIterationCount = 256" in VARIANTS["256 iterations"](stage).text
     assert "elasticityDamping = 0.002" in VARIANTS["damping 2 ms"](stage).text
-    assert VARIANTS["four times the mass"](stage).band.tube.mass.sum() == pytest.approx(
-        4 * stage.band.tube.mass.sum()
-    )
     bent = VARIANTS["opened bent"](stage).text
     points = [line.split(" = ")[1] for line in bent.splitlines() if "points = " in line.lower()]
     assert len(points) == 3 and len(set(points)) == 2

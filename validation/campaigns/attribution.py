@@ -64,14 +64,15 @@ METHODS = {  # and the words of the table
     "later_pictures": "… the recoil's pictures of 50 ms instead of 34",
     "recoil_trusted_half": "… a recoil's picture trusted half as much",
 }
+EARLIER = {"first_picture": "… the recoil's first picture alone"}  # before Rule.recoil was 34 ms
 RECORDINGS = {"bands": 3, "sealed": 1}
 BANDS = {"bands": SETS["bands"][:2], "sealed": (SPENT, tuple(rubbers(SPENT)))}  # seed, names
 OF_ORANGE = "orange", "orange_2", "orange_3"
 REPORT, PAGE = Path("reports/validation/attribution.json"), Path("docs/paper.md")
 COLUMNS = {  # of the table
-    ("bands", "informative"): "rig bands, dips",
+    ("bands", "informative"): "rig bands, informative",
     ("bands", "paper"): "rig bands, the paper's pull",
-    ("sealed", "informative"): "once sealed, dips",
+    ("sealed", "informative"): "once sealed, informative",
     ("sealed", "paper"): "once sealed, the paper's pull",
     ("orange", "paper"): "`orange`, the paper's pull",
 }
@@ -239,8 +240,11 @@ def block(content: dict) -> str:
     there = {", ".join(key): words for key, words in COLUMNS.items()}
     heads = [f"{words} ({_units(content['figures'][key])})" for key, words in there.items()]
     rows = ["| identified by | " + " | ".join(heads) + " |", "|---|" + "---:|" * len(heads)]
-    for method, words in METHODS.items():
-        cells = [_cell(content["figures"][key].get(method)) for key in there]
+    for method, words in (METHODS | EARLIER).items():
+        figures_of = [content["figures"][key].get(method) for key in there]
+        if not any(figures_of):
+            continue
+        cells = list(map(_cell, figures_of))
         rows.append(f"| {words} | " + " | ".join(cells) + " |")
     return begin + "\n".join(rows) + "\n" + end
 

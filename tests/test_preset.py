@@ -13,7 +13,7 @@ from ruamel.yaml import YAML
 from pipeline.base.errors import UserError
 from pipeline.params import load
 from tests.project import DEFAULTS, ROOT, until
-from tools.preset import KEPT, PRESETS, preset, timed, write_preset
+from tools.preset import KEPT, PRESETS, preset, store_report, timed, write_preset
 from validation.benchmarks.methods import LARGE
 
 RUN = ["sh", "-c", "test -e finish || exec sleep 60"]
@@ -125,3 +125,23 @@ def test_a_termination_ends_the_run_as_well(tmp_path: Path) -> None:
     finally:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
+
+
+def test_a_report_is_stored_in_a_folder_of_its_preset(tmp_path) -> None:
+    """What is copied is linked there, and all else where it was; the copy before is replaced."""
+    reports = tmp_path / "reports"
+    for part in ("figures", "tables"):
+        (reports / part).mkdir(parents=True)
+        (reports / part / "a").write_text(part)
+    links = "[a](figures/a) [b](bands/b/README.md) [c](../docs/c.md) [d](#d) [e](https://e.org)"
+    for file in ("README.md", "appendix.md", "summary.json", "run.js"):
+        (reports / file).write_text(links + " [f](appendix.md#f)")
+    earlier = reports / "presets/large/old"
+    earlier.mkdir(parents=True)
+    folder = store_report(reports, "large")
+    assert folder == reports / "presets/large" and not earlier.exists()
+    assert (folder / "README.md").read_text() == (
+        "[a](figures/a) [b](../../bands/b/README.md) [c](../../../docs/c.md) [d](#d)"
+        " [e](https://e.org) [f](appendix.md#f)"
+    )
+    assert (folder / "tables/a").read_text() == "tables" and (folder / "run.js").exists()

@@ -3,13 +3,16 @@
     python tools/preset.py large    # as `make large`; further arguments go to `sling flow`
 
 The preset's keys are written into params.yaml, for `git diff` to show and `sling reset` to take
-back (`git checkout reports dvc.lock` for its results); then `sling flow`. Killed, it goes on where
-it was, and `seconds` in reports/run.js adds up its stretches.
+back (`git checkout reports dvc.lock` for its results); then `sling flow`. Its report is copied to
+reports/presets/. Killed, it goes on where it was, and `seconds` in reports/run.js adds up its
+stretches.
 """
 
 from __future__ import annotations
 
 import json
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -25,12 +28,14 @@ sys.path.insert(0, str(ROOT))
 from app.params_file import edited  # noqa: E402
 from pipeline.base import errors  # noqa: E402
 from pipeline.base.errors import UserError  # noqa: E402
-from pipeline.base.files import write_json, write_text  # noqa: E402
+from pipeline.base.files import replacing_folder, write_json, write_text  # noqa: E402
 from pipeline.params import parse  # noqa: E402
 from pipeline.report.run.run import write_run  # noqa: E402
 
 PRESETS = ROOT / "presets"
 KEPT = Path(".checkpoints", "preset.json")  # "runs" and the "stretches" [s] of a run without an end
+PAGES, PARTS = ("README.md", "appendix.md"), ("figures", "tables", "summary.json", "run.js")
+ELSEWHERE = re.compile(rf"(\]\()(?!https?:|#|{'|'.join(map(re.escape, (*PAGES, *PARTS)))})")
 TICK = 10.0  # s, that a kill may lose of its stretch
 
 
@@ -88,6 +93,23 @@ def timed(
     return status, stretches
 
 
+def store_report(reports: Path, name: str) -> Path:
+    """Copy a run's report to reports/presets/<name>/; links to what is not copied still lead there.
+
+    Returns the folder. The bands' cards stay where they are: a later run replaces them.
+    """
+    folder = reports / "presets" / name
+    folder.parent.mkdir(exist_ok=True)
+    with replacing_folder(folder) as temporary:
+        for page in PAGES:
+            text = (reports / page).read_text(encoding="utf-8")
+            write_text(temporary / page, ELSEWHERE.sub(r"\1../../", text))
+        for part in PARTS:
+            source = reports / part
+            (shutil.copytree if source.is_dir() else shutil.copy)(source, temporary / part)
+    return folder
+
+
 def main() -> int:
     if len(sys.argv) < 2:
         raise UserError("usage: python tools/preset.py NAME [arguments of `sling flow`]")
@@ -103,6 +125,7 @@ def main() -> int:
             "stretches": len(stretches),
         }
         print(json.dumps(write_run(ROOT / "reports", **took), indent=2))
+        print(f"its report: {store_report(ROOT / 'reports', name).relative_to(ROOT)}/README.md")
     return status
 
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -166,8 +167,9 @@ def near_draws(model: CalibratedBand) -> np.ndarray:
 
 def match_of(target: str) -> Callable[[CalibratedBand, UsdBand], UsdMatch | None] | None:
     """What an installed package offers to match a target in its engine; None: nothing."""
-    for entry in entry_points(group=GROUP, name=target):
-        return imported(entry.value)  # pyright: ignore[reportReturnType]
+    with suppress(ImportError):  # a light install lacks what the engine's side needs
+        for entry in entry_points(group=GROUP, name=target):
+            return imported(entry.value)
     return None
 
 

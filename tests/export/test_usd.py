@@ -1,10 +1,13 @@
 """PhysX's USD: valid by usd-core and by PhysX's own schemas; its law on paper."""
 
 import json
+import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from pipeline.export import usd
 from pipeline.export.usd import ON_PAPER, nominal
 from sling2sim2real import export
 from tests.project import ROOT
@@ -81,3 +84,15 @@ def test_its_nodes_hang_between_the_clamps(done) -> None:
     assert places[nodes["hand"]].mean(axis=0) == pytest.approx(
         [0, 0, places[:, 2].min()], abs=0.006
     )
+
+
+def test_a_match_is_offered_by_an_entry_point_whose_module_can_be_imported(monkeypatch) -> None:
+    offered = {"usd": "math:sqrt", "newton": "no_such_module:match"}
+
+    def entry_points(group: str, name: str) -> list:
+        assert group == usd.GROUP
+        return [SimpleNamespace(value=offered[name])] if name in offered else []
+
+    monkeypatch.setattr(usd, "entry_points", entry_points)
+    assert usd.match_of("usd") is math.sqrt
+    assert usd.match_of("newton") is usd.match_of("mjcf") is None

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from app.plan.force import Held, Prediction
-from app.plan.pull import BACK, DRAWS
+from app.plan.pull import BACK, PULL
 from app.plan.trajectory import Trajectory
 from pipeline.base.errors import UserError
 from pipeline.episode.planned import leg_time
@@ -77,7 +77,7 @@ def check_motion(trajectory: Trajectory, plan: PlanParams) -> None:
     """Largest speed and acceleration of every phase."""
     speeds, accelerations = trajectory.peaks(1), trajectory.peaks(2)
     for phase, speed, acceleration in zip(trajectory.phases, speeds, accelerations, strict=True):
-        name = "pull_speed" if phase.name in DRAWS else "max_speed"
+        name = "pull_speed" if phase.name == PULL else "max_speed"
         where = " (plan.dips)" if phase.name in BACK else ""
         for value, limit, key, unit in (
             (speed, getattr(plan, name), name, "m/s"),
@@ -118,8 +118,8 @@ def check_window(
         if precondition:
             advice = f"take a smaller --precondition, or {advice}"
         shares = np.diff(sorted({0.0, 1.0, *(dip.at for dip in plan.dips)}))
-        legs = np.append(shares, np.ones(precondition)) * np.linalg.norm(plan.draw)
-        time = sum(lasts[name] for name in DRAWS) - over
+        legs = shares * np.linalg.norm(plan.draw)
+        time = lasts[PULL] - over
         if time > 0:
             speed = np.ceil(1000 * 2 * legs.sum() / time) / 1000
             least = sum(leg_time(leg, speed, plan.max_acceleration) for leg in legs)

@@ -22,7 +22,6 @@ from pipeline.recording.pulls import CALM
 TICK = 0.001  # s: phases last whole ticks
 STRETCH, SLACKEN = "stretch", "slacken"  # a preconditioning pull, and back to the fork
 BACK = LET_BACK, REDRAW
-DRAWS = PULL, STRETCH  # at plan.pull_speed
 SPARE = 0.5  # s beyond what the episode asks for, since nobody starts a recorder on the tick
 
 
@@ -107,7 +106,7 @@ def trajectory_of(
     rest = max(plan.lead_in, CALM + SPARE + before - between)
     again = [back, Phase("lead-in", start, _ticks(rest), wide), *pull]
     first = [
-        leg(STRETCH, level, drawn, plan.pull_speed, closed),
+        leg(STRETCH, level, drawn, plan.max_speed, closed),
         leg(SLACKEN, drawn, level, plan.max_speed, closed),
     ]
     pull[3:3] = precondition * first  # after approach, grasp and lift

@@ -268,12 +268,13 @@ def test_the_advice_of_a_refusal_is_enough(params) -> None:
 
 
 def test_the_advice_with_dips_and_preconditioning_is_enough(params) -> None:
-    """The speed that the line names is that of all draws, and is accepted."""
+    """The speed that the line names is that of the pull, and is accepted."""
     dips = with_(params, "plan", dips=(dip(), dip(at=0.7)))
     with pytest.raises(UserError, match="take a smaller --precondition, or take --pull") as error:
         plan_recording(dips, "band1", precondition=2)
     progress = float(str(error.value).split("raise plan.pull_speed to ")[1].split(",")[0])
     plan_recording(with_(dips, "plan", pull_speed=progress), "band1", precondition=2)
+    plan_recording(with_(params, "plan", dips=load(DEFAULTS).plan.dips), "band1", precondition=1)
     with pytest.raises(UserError, match="--precondition: at most 10, got 11"):
         plan_recording(dips, "band1", precondition=11)
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from app.plan.force import Held, Prediction
-from app.plan.pull import BACK, PULL
+from app.plan.pull import BACK
 from app.plan.trajectory import Trajectory
 from pipeline.base.errors import UserError
-from pipeline.episode.planned import leg_time
+from pipeline.episode.planned import PULL, leg_time
 from pipeline.params.lab import BandParams, PlanParams, SetupParams
 from pipeline.params.recording import EpisodeParams
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from app.plan.trajectory import Phase, Trajectory
-from pipeline.episode.planned import LET_BACK, PULL, REDRAW, leg_time, legs_of
+from pipeline.episode.planned import LET_BACK, REDRAW, leg_time, legs_of
 from pipeline.episode.window import LEAD
 from pipeline.params.lab import BandParams, PlanParams, SetupParams
 from pipeline.params.recording import EpisodeParams

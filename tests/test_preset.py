@@ -134,7 +134,7 @@ def test_a_report_is_stored_in_a_folder_of_its_preset(tmp_path) -> None:
         (reports / part).mkdir(parents=True)
         (reports / part / "a").write_text(part)
     links = "[a](figures/a) [b](bands/b/README.md) [c](../docs/c.md) [d](#d) [e](https://e.org)"
-    for file in ("README.md", "appendix.md", "summary.json", "run.js"):
+    for file in ("README.md", "appendix.md", "run.js"):
         (reports / file).write_text(links + " [f](appendix.md#f)")
     earlier = reports / "presets/large/old"
     earlier.mkdir(parents=True)

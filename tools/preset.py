@@ -34,7 +34,7 @@ from pipeline.report.run.run import write_run  # noqa: E402
 
 PRESETS = ROOT / "presets"
 KEPT = Path(".checkpoints", "preset.json")  # "runs" and the "stretches" [s] of a run without an end
-PAGES, PARTS = ("README.md", "appendix.md"), ("figures", "tables", "summary.json", "run.js")
+PAGES, PARTS = ("README.md", "appendix.md"), ("figures", "tables", "run.js")
 ELSEWHERE = re.compile(rf"(\]\()(?!https?:|#|{'|'.join(map(re.escape, (*PAGES, *PARTS)))})")
 TICK = 10.0  # s, that a kill may lose of its stretch
 

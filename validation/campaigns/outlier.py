@@ -1,0 +1,95 @@
+"""Why one rubber lands far from what is expected: its parts left out, one at a time.
+
+    python -m validation.campaigns.outlier
+
+The sealed rubber that is farthest off by the pull with dips (landings-sealed.json) is recorded
+again as it is, without its flow, and with a loss that is nearer to what rubbers have. Writes
+reports/validation/landings-outlier.json.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from pipeline.base import errors
+from pipeline.base.environment import environment
+from pipeline.base.files import write_json
+from pipeline.params import Params, load
+from rig.oracle.world import World
+from validation.campaigns import runner
+from validation.campaigns.landings import report_of
+from validation.campaigns.rig_scores import recorded, saved, scored, sling_of, summary
+from validation.campaigns.runner import OURS, ResultLines, plain, result_of
+from validation.density import calibrated_by
+from validation.projects import DEFAULTS
+from validation.rubbers import SEALED, with_rubbers
+
+REPORT = Path("reports/validation/landings-outlier.json")
+USUAL = 0.0015  # s, of viscosity: within what the rubbers' seed draws
+CHANGES: dict[str, dict] = {
+    "as it is": {},
+    "without its flow": {"flow": None},
+    "with more viscosity": {"viscosity": USUAL},
+}
+
+
+@dataclass(frozen=True)
+class Changed:
+    """A rubber with one part changed."""
+
+    band: str
+    change: str
+
+    @property
+    def params(self) -> Params:
+        params = with_rubbers(load(DEFAULTS), SEALED, 0, "informative")
+        content = params.model_dump(mode="json", exclude_unset=True)
+        content["rig"]["bands"][self.band] |= CHANGES[self.change]
+        return Params.model_validate(content)
+
+
+def farthest() -> str:
+    """Name of the sealed rubber with the largest bias by dips."""
+    content = json.loads(report_of("sealed").read_text(encoding="utf-8"))
+    bands = content["figures"]["informative, virgin"]["bands"]
+    return max(bands, key=lambda name: abs(bands[name]["mean_bias"]))
+
+
+def identified(job: Changed, work: Path) -> dict:
+    params, folder = job.params, work / job.change.replace(" ", "-")
+    episode = recorded(params, job.band, folder)
+    outcome, confidence = calibrated_by(
+        params, OURS, sling_of(params, job.band, OURS, folder), [episode]
+    )
+    with World(job.band, saved(params, folder / "params.yaml"), workers=1) as world:
+        scores = scored(outcome, params, world, seed=0)
+    return plain({"scores": scores, "parameters": confidence["parameters"]})
+
+
+def performed(job: Changed, work: Path) -> dict:
+    return result_of(job, partial(identified, job, work))
+
+
+def main() -> None:
+    parser = runner.parser(str(__doc__), REPORT, Path(".checkpoints/outlier"))
+    arguments = parser.parse_args()
+    work, band = arguments.work.resolve(), farthest()
+    results, todo = ResultLines(work / "results.jsonl"), [Changed(band, name) for name in CHANGES]
+    runner.run(partial(performed, work=work), todo, results, arguments.workers)
+    rows = {}
+    for line in results.among(todo):
+        figures = summary([line["scores"]])
+        loss = line["parameters"]["elasticity_damping"]
+        rows[line["change"]] = figures | {"damping_s": [loss["low"], loss["high"]]}
+        print(f"{line['change']}: bias {100 * figures['mean_bias']:+.1f} %", flush=True)
+    described = environment("cpu", "python -m validation.campaigns.outlier")
+    write_json(
+        arguments.report, plain({"band": band, "changes": CHANGES, "figures": rows}) | described
+    )
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -35,7 +35,9 @@ from pipeline.report.run.run import write_run  # noqa: E402
 PRESETS = ROOT / "presets"
 KEPT = Path(".checkpoints", "preset.json")  # "runs" and the "stretches" [s] of a run without an end
 PAGES, PARTS = ("README.md", "appendix.md"), ("figures", "tables", "run.js")
-ELSEWHERE = re.compile(rf"(\]\()(?!https?:|#|{'|'.join(map(re.escape, (*PAGES, *PARTS)))})")
+ELSEWHERE = re.compile(
+    rf"(\]\()(?!https?:|#|(?:{'|'.join(map(re.escape, (*PAGES, *PARTS)))})(?=[/#)]))"
+)
 TICK = 10.0  # s, that a kill may lose of its stretch
 
 
@@ -125,7 +127,8 @@ def main() -> int:
             "stretches": len(stretches),
         }
         print(json.dumps(write_run(ROOT / "reports", **took), indent=2))
-        print(f"its report: {store_report(ROOT / 'reports', name).relative_to(ROOT)}/README.md")
+        if not more:  # of all stages
+            print(f"its report: {store_report(ROOT / 'reports', name).relative_to(ROOT)}/README.md")
     return status
 
 

@@ -64,8 +64,9 @@ def compared_row(compared: DrawCompared) -> dict:
     for name, error in compared.errors.items():
         ours, theirs = getattr(compared, name)
         row[f"{name}_{UNITS[name]}"] = rounded(ours, 4)
-        row[f"{name}_there_{UNITS[name]}"] = rounded(theirs, 4)
-        row[f"{name}_error"] = round(error, 4)
+        lost = not np.isfinite(theirs)
+        row[f"{name}_there_{UNITS[name]}"] = None if lost else rounded(theirs, 4)
+        row[f"{name}_error"] = None if lost else round(error, 4)
     return row
 
 

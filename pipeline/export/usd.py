@@ -10,7 +10,7 @@ Young's modulus is scaled until a straight string of it holds as the calibrated 
 Where PhysX is at hand, modulus and mass are then matched in it (GROUP).
 
 The stage opens with the straight band at rest: a volume whose `points` are bent while it is opened
-collapses across in PhysX (reports/validation/export-usd-causes.json), and then holds half. So the
+collapses across in PhysX (reports/validation/export-usd-causes.json), and holds too little. So the
 ends are nodes to be led, not attachments; nodes.json says which, and where.
 """
 
@@ -167,7 +167,7 @@ def near_draws(model: CalibratedBand) -> np.ndarray:
 
 def match_of(target: str) -> Callable[[CalibratedBand, UsdBand], UsdMatch | None] | None:
     """What an installed package offers to match a target in its engine; None: nothing."""
-    with suppress(ImportError):  # a light install lacks what the engine's side needs
+    with suppress(ModuleNotFoundError):  # a light install lacks what the engine's side needs
         for entry in entry_points(group=GROUP, name=target):
             return imported(entry.value)
     return None

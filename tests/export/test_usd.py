@@ -2,11 +2,13 @@
 
 import json
 import math
+import tomllib
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from pipeline.base.imported import imported
 from pipeline.export import usd
 from pipeline.export.usd import ON_PAPER, nominal
 from sling2sim2real import export
@@ -15,7 +17,17 @@ from tests.project import ROOT
 
 @pytest.fixture(scope="module")
 def done(model, tmp_path_factory):
-    return export(model, "usd", tmp_path_factory.mktemp("exports") / "toy")
+    """As without PhysX, wherever the test runs."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(usd, "match_of", lambda target: None)
+        return export(model, "usd", tmp_path_factory.mktemp("exports") / "toy")
+
+
+def test_the_project_offers_its_match_in_physx() -> None:
+    from validation.engines.physx import match
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert imported(project["entry-points"][usd.GROUP]["usd"]) is match.matched
 
 
 def test_its_law_is_hookes_when_small_and_stiffer_than_rubber_when_large() -> None:
@@ -42,7 +54,7 @@ def test_what_it_expects_of_itself_is_what_the_committed_study_saw(done) -> None
         errors = [row[f"{name}_error"] for row in rows]
         assert (round(min(errors), 2), round(max(errors), 2)) == (low, high)
     text = (done.folder / "README.md").read_text()
-    assert f"landed {100 * ON_PAPER['landing'][0]:+.0f} to" in " ".join(text.split())
+    assert f"landed {100 * ON_PAPER['landing'][0]:.0f} to" in " ".join(text.split())
 
 
 def test_usd_and_the_schemas_of_physx_know_all_that_is_in_it(done) -> None:

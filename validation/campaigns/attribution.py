@@ -9,6 +9,7 @@ by every variant: by the paper's search with either law, by our density with eit
 density with other priors or less trust in the recoil. Landings are scored as by
 validation/campaigns/landings.py, with bands as units; of `orange`, whose landings are given, the
 unit is a recording. Results are lines of results.jsonl in --work: a run that was killed goes on.
+After a change of pulls or methods, give another --work.
 """
 
 from __future__ import annotations

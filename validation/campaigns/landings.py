@@ -273,6 +273,10 @@ def block(contents: dict[str, dict]) -> str:
                 width = 100 * means["median_width"]
                 cells += [f"{width:.1f} %", f"{settled} of {count}"]
             rows.append("| " + " | ".join(cells).replace("-", "−") + " |")
+    for name, words in WORDS.items():
+        there, whole = contents[name]["jobs"]
+        if there < whole:
+            rows += ["", f"Of {words} {there} of {whole} identifications have run."]
     return begin + "\n".join(rows) + "\n" + end
 
 

@@ -3,7 +3,7 @@
     python -m validation.campaigns.outlier
 
 The sealed rubber that is farthest off by the pull with dips (landings-sealed.json) is recorded
-again as it is, without its flow, and with a loss that is nearer to what rubbers have. Writes
+again as it is, without its flow, and with more viscosity. Writes
 reports/validation/landings-outlier.json.
 """
 
@@ -81,6 +81,9 @@ def main() -> None:
     runner.run(partial(performed, work=work), todo, results, arguments.workers)
     rows = {}
     for line in results.among(todo):
+        if "failed" in line:
+            rows[line["change"]] = {"failed": line["failed"]}
+            continue
         figures = summary([line["scores"]])
         loss = line["parameters"]["elasticity_damping"]
         rows[line["change"]] = figures | {"damping_s": [loss["low"], loss["high"]]}

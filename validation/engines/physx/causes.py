@@ -89,7 +89,7 @@ def opened_bent(variant: Variant) -> Variant:
 
 
 def with_attachments(variant: Variant) -> Variant:
-    """The stage's own clamps hold its ends."""
+    """Add attachments that hold the ends, which are led anyway."""
     tube, parts = variant.band.tube, []
     ends = variant.band.ends.reshape(2, -1)
     for side, tip, vertices in zip(("Left", "Right"), tube.clamped[[1, -2], 0], ends, strict=True):
@@ -153,7 +153,9 @@ def main() -> None:
     name = json.loads((requested.usd / "card.json").read_text("utf-8"))["band"]
     if not (numbers := requested.yaml / f"{name}.yaml").exists():
         raise UserError(f"{numbers}: no such file; `sling export --to yaml` writes it")
-    launches = YAML(typ="safe").load(numbers)["launches"]
+    launches = YAML(typ="safe").load(numbers).get("launches")
+    if not launches:
+        raise UserError(f"{numbers}: has no launches; `sling export --to yaml` writes them")
     launches.sort(key=lambda launch: np.hypot(*launch["draw_m"]))
     stiffness, rows = load().setup.arm_stiffness, {}
     content = {"asked": "One change at a time; what it holds beside the calibrated simulation."}

@@ -55,7 +55,9 @@ def read(folder: Path) -> tuple[str, UsdBand]:
         young = _value(text, "float omniphysics:youngsModulus")
         poisson = _value(text, "float omniphysics:poissonsRatio")
         friction = _value(text, "float omniphysics:dynamicFriction")
-    except (OSError, ValueError, KeyError) as error:
+        if np.shape(places) != rest.shape:
+            raise ValueError("nodes.json is of another stage")
+    except (OSError, ValueError, KeyError, TypeError, SyntaxError) as error:
         raise UserError(f"{folder}: {error}; `sling export --to usd` writes it") from error
     count = int(np.isclose(rest[:, 0], rest[0, 0]).sum())
     rest, hanging = (np.reshape(points, (-1, count, 3)) for points in (rest, places))

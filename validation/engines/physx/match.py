@@ -1,14 +1,15 @@
 """Match an exported band in PhysX: Young's modulus to the force held, the mass to the landings.
 
-`sling export --to usd` calls it where PhysX and a GPU are there. PhysX's steps take launch speed
-that no damping gives back, and its damping changes what the band holds; so the band has none, and
-a mass of its own. Bands of nine pairs of modulus and mass are launched at once; errors are taken as
-linear in the logarithms of both, which fits them and averages over what PhysX scatters. Then the
-stage itself is launched, one draw after the other: those of the match, and three that took no part.
+`sling export --to usd` calls it where PhysX and a GPU are there. PhysX's damping changes what the
+band holds; so the band has none, and would be too fast: the mass stands in for what a launch loses.
+Bands of nine pairs of modulus and mass are launched, three at once; errors are taken as linear in
+the logarithms of both, which fits them and averages over what PhysX scatters. Then the stage itself
+is launched, one draw after the other: those of the match, and three that took no part.
 """
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +22,7 @@ from pipeline.export.match import HOLD, LANDING, compared, proof_draws
 from pipeline.export.usd import ITERATIONS, RATE, UsdBand, UsdMatch, near_draws
 from pipeline.simulator.launch import Launches
 from validation.engines.physx import scene
-from validation.engines.physx.bands import Engine, release
+from validation.engines.physx.bands import INTERPRETER, Engine, release
 from validation.engines.physx.exported import launched, yielded
 
 ROUNDS = (0.08, 0.25), (0.04, 0.10)  # logarithms of modulus and mass to both sides, each round
@@ -29,10 +30,15 @@ FARTHEST = 0.5  # of either logarithm from where the match begins
 
 
 def matched(model: CalibratedBand, band: UsdBand) -> UsdMatch | None:
-    """The band as PhysX wants it, and what that leaves; None where there is no PhysX or no GPU."""
+    """The band as PhysX wants it, and what that leaves; None where there is no PhysX or no GPU.
+
+    Raises UserError where the Python that SLING_PHYSX names has none, or PhysX fails.
+    """
     try:
         version = release()
     except UserError:
+        if os.environ.get(INTERPRETER):
+            raise
         return None
     if not wp.is_cuda_available():
         return None

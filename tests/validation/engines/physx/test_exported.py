@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
+from pipeline.export import usd
 from pipeline.export.replay import Shot
 from pipeline.simulator.cylinder import volumes
 from sling2sim2real import Band, Model, Settings, Theta, export
@@ -26,6 +27,13 @@ def model(delivered) -> Model:
 @pytest.fixture(scope="module")
 def folder(model, tmp_path_factory):
     return export(model, "usd", tmp_path_factory.mktemp("stage") / "usd").folder
+
+
+@pytest.fixture(scope="module", autouse=True)
+def without_physx():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(usd, "match_of", lambda target: None)
+        yield
 
 
 class OneHalfStretched:
@@ -55,11 +63,15 @@ def test_the_stage_is_read_as_it_was_written(model, folder):
 def test_what_is_no_export_is_refused_in_a_line(model, tmp_path):
     folder = export(model, "usd", tmp_path / "usd").folder
     stage = folder / "toy.usda"
-    stage.write_text(stage.read_text().replace("restShapePoints", "shape"))
+    stage.write_text(stage.read_text().replace("restShapePoints", "shapePoints"))
     with pytest.raises(UserError, match="has no point3f.. omniphysics:restShapePoints"):
         read(folder)
     with pytest.raises(UserError, match="No such file"):
         read(tmp_path / "none")
+    (folder / "nodes.json").write_text('{"hanging_m": [[0, 0, 0]]}')
+    stage.write_text(stage.read_text().replace("omniphysics:shape", "omniphysics:restShape"))
+    with pytest.raises(UserError, match="nodes.json is of another stage"):
+        read(folder)
 
 
 def test_ends_and_hand_are_led_where_they_belong(folder):

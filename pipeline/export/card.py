@@ -59,8 +59,11 @@ def content(model: CalibratedBand, done: Matched, target: str, files: dict[str, 
 
 
 def compared_row(compared: DrawCompared) -> dict:
-    """A draw as card.json has it: both engines' values and the relative errors."""
-    row = {"draw_y_m": rounded(compared.draw[0], 6), "draw_z_m": rounded(compared.draw[1], 6)}
+    """A draw as card.json has it: both engines' values, relative errors; None: it is lost."""
+    row: dict[str, float | None] = {
+        "draw_y_m": rounded(compared.draw[0], 6),
+        "draw_z_m": rounded(compared.draw[1], 6),
+    }
     for name, error in compared.errors.items():
         ours, theirs = getattr(compared, name)
         row[f"{name}_{UNITS[name]}"] = rounded(ours, 4)

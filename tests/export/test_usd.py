@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.base.imported import imported
 from pipeline.export import usd
+from pipeline.export.match import DrawCompared
 from pipeline.export.usd import ON_PAPER, nominal
 from sling2sim2real import export
 from tests.project import ROOT
@@ -108,3 +109,21 @@ def test_a_match_is_offered_by_an_entry_point_whose_module_can_be_imported(monke
     monkeypatch.setattr(usd, "entry_points", entry_points)
     assert usd.match_of("usd") is math.sqrt
     assert usd.match_of("newton") is usd.match_of("mjcf") is None
+
+
+def test_a_launch_that_is_lost_in_the_engine_is_a_gap_in_the_card(
+    model, tmp_path, monkeypatch
+) -> None:
+    def match(model, band: usd.UsdBand) -> usd.UsdMatch:
+        lost = DrawCompared((-0.3, -0.2), (8.0, 8.1), (4.0, np.nan), (2.0, np.nan))
+        landed = DrawCompared((-0.3, -0.1), (6.0, 6.1), (4.0, 4.1), (1.0, 1.1))
+        return usd.UsdMatch(band, [landed], [lost, landed], [landed], "an engine")
+
+    monkeypatch.setattr(usd, "match_of", lambda target: match)
+    done = export(model, "usd", tmp_path / "usd")
+    assert done.met is False and done.card["proof"][0]["landing_error"] is None
+    text = (done.folder / "README.md").read_text()
+    assert "| +1.2 % | 2.000 m | does not land |" in text and "| 1.000 m | +10.0 % |" in text
+    assert "not as near as asked" in text and "Match it before" not in text
+    blocks = text.split("\n\n")
+    assert any(block.startswith("`toy.usda` has the scene") for block in blocks)

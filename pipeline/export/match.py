@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,6 +60,14 @@ def draws_of(model: CalibratedBand) -> np.ndarray:
             f"draw_z) land near policy.targets within setup.max_force; a match needs {LEAST}"
         )
     return draws[good]
+
+
+def within_limits(proof: Sequence[DrawCompared]) -> bool:
+    """Whether each draw is held and lands as near as is asked: HOLD, LANDING."""
+    return all(
+        abs(draw.errors["hold_force"]) <= HOLD and abs(draw.errors["landing"]) <= LANDING
+        for draw in proof
+    )
 
 
 def compared(model: CalibratedBand, draws: np.ndarray, shots: list[Shot]) -> list[DrawCompared]:

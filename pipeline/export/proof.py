@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.export.band import CalibratedBand, pull_to
 from pipeline.export.chain import SpringChain
-from pipeline.export.match import HOLD, LANDING, DrawCompared, compared, draws_of
+from pipeline.export.match import DrawCompared, compared, draws_of, within_limits
 from pipeline.export.pull import PullCompared, compare_pull
 from pipeline.export.replay import ChainReplay
 
@@ -37,11 +37,7 @@ class Matched:
 
     @property
     def met(self) -> bool:
-        return all(
-            abs(draw_compared.errors["hold_force"]) <= HOLD
-            and abs(draw_compared.errors["landing"]) <= LANDING
-            for draw_compared in self.proof
-        )
+        return within_limits(self.proof)
 
 
 def proven(

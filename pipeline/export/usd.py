@@ -32,7 +32,7 @@ from pipeline.export import values as export_values
 from pipeline.export.band import CalibratedBand
 from pipeline.export.card import ASKED, compared_row, readme
 from pipeline.export.chain import SpringChain
-from pipeline.export.match import HOLD, LANDING, DrawCompared, draws_of
+from pipeline.export.match import DrawCompared, draws_of, within_limits
 from pipeline.export.mesh import Tube
 from pipeline.report.quantities import rounded
 from pipeline.simulator.model import GRAVITY
@@ -94,10 +94,7 @@ class UsdMatch:
 
     @property
     def met(self) -> bool:
-        return all(
-            abs(draw.errors["hold_force"]) <= HOLD and abs(draw.errors["landing"]) <= LANDING
-            for draw in self.proof
-        )
+        return within_limits(self.proof)
 
 
 def to_usd(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:

@@ -29,6 +29,7 @@ from pipeline.export.usd import UsdBand
 from pipeline.params import load
 from validation.engines.physx.bands import Engine, release
 from validation.engines.physx.exported import Steps, held, read, yielded
+from validation.engines.physx.scene import tuples
 
 REPORT = Path("reports/validation/export-usd-causes.json")
 ITERATIONS = "physxDeformableBody:solverPositionIterationCount"
@@ -84,7 +85,7 @@ def with_rate(variant: Variant, rate: int) -> Variant:
 def opened_bent(variant: Variant) -> Variant:
     """The stage's `points` are where the band hangs; it is at rest as it was."""
     places = variant.band.tube.clamped.reshape(-1, 3)
-    changed = with_property(variant, "point3f[] points", _tuples(places))
+    changed = with_property(variant, "point3f[] points", tuples(places, ".9g"))
     return replace(changed, bent=True)
 
 
@@ -95,17 +96,13 @@ def with_attachments(variant: Variant) -> Variant:
     for side, tip, vertices in zip(("Left", "Right"), tube.clamped[[1, -2], 0], ends, strict=True):
         values = {
             "side": side,
-            "place": _tuples(tip[None])[1:-1],
+            "place": tuples(tip[None], ".9g")[1:-1],
             "vertices": vertices.tolist(),
-            "offsets": _tuples(tube.clamped.reshape(-1, 3)[vertices] - tip),
+            "offsets": tuples(tube.clamped.reshape(-1, 3)[vertices] - tip, ".9g"),
         }
         parts.append(CLAMP % values)
     body = variant.text.rstrip().removesuffix("}")
     return replace(variant, text=f"{body}{''.join(parts)}}}\n")
-
-
-def _tuples(rows: np.ndarray) -> str:
-    return "[" + ", ".join(f"({', '.join(f'{v:.9g}' for v in row)})" for row in rows) + "]"
 
 
 VARIANTS: dict[str, Callable[[Variant], Variant]] = {

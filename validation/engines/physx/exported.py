@@ -23,7 +23,7 @@ from pipeline.simulator.launch import Launches
 from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.engines.physx.bands import Engine
-from validation.engines.physx.flight import Flight
+from validation.engines.physx.flight import Flight, led_to
 from validation.engines.physx.law import force_on, gradients
 
 HANG, PULL, HOLD = 1.0, 2.0, 1.0  # s
@@ -87,8 +87,7 @@ def job_of(band: UsdBand, places: np.ndarray, offsets: np.ndarray, steps: Steps)
     part = part**3 * (10 - 15 * part + 6 * part**2)
     begin = flat[band.hand].mean(axis=0)
     path = begin + part[:, None, None] * (places - begin)
-    section = band.tube.rest[band.tube.middle] * [0.0, 1.0, 1.0]
-    ends = np.broadcast_to(flat[band.ends], (len(part), len(places), len(band.ends), 3))
+    led = led_to(band.tube, path.reshape(-1, 3))
     return {
         "step": 1 / steps.rate,
         "phases": 2,
@@ -100,7 +99,7 @@ def job_of(band: UsdBand, places: np.ndarray, offsets: np.ndarray, steps: Steps)
         "fade_0": np.zeros(hang),
         "keep_0": np.zeros(hang, bool),
         "vertices_1": np.concatenate([band.ends, band.hand]),
-        "targets_1": np.concatenate([ends, path[:, :, None] + section], axis=2),
+        "targets_1": led.reshape(*path.shape[:2], -1, 3),
         "fade_1": 1 - part,
         "keep_1": np.arange(pull + hold) == pull + hold - 1,
     }

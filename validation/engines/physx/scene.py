@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 
 from pipeline.export.mesh import Tube
+from pipeline.export.usd import surface
 from pipeline.simulator.model import GRAVITY
 
 SPACING = np.array([1.0, 2.5])  # m along x and y from band to band: none reaches the next
@@ -71,14 +70,6 @@ def offsets(count: int) -> np.ndarray:
     return np.stack([column * SPACING[0], row * SPACING[1], 0.0 * row], axis=1)
 
 
-def surface(tetrahedra: np.ndarray) -> np.ndarray:
-    """Faces (F, 3) that belong to one tetrahedron only, seen counter-clockwise from outside."""
-    faces = tetrahedra[:, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]].reshape(-1, 3)
-    keys = [tuple(face) for face in np.sort(faces, axis=1)]
-    count = Counter(keys)
-    return faces[[count[key] == 1 for key in keys]]
-
-
 def text(tube: Tube, thetas: np.ndarray, rate: int, iterations: int) -> str:
     """The scene.
 
@@ -88,9 +79,9 @@ def text(tube: Tube, thetas: np.ndarray, rate: int, iterations: int) -> str:
         iterations: Of the solver a step.
     """
     mesh = {
-        "points": _tuples(tube.rest.reshape(-1, 3), ".9g"),
-        "tetrahedra": _tuples(tube.tetrahedra, "d"),
-        "faces": _tuples(surface(tube.tetrahedra), "d"),
+        "points": tuples(tube.rest.reshape(-1, 3), ".9g"),
+        "tetrahedra": tuples(tube.tetrahedra, "d"),
+        "faces": tuples(surface(tube.tetrahedra), "d"),
         "mass": tube.mass.sum(),
         "iterations": iterations,
     }
@@ -103,5 +94,6 @@ def text(tube: Tube, thetas: np.ndarray, rate: int, iterations: int) -> str:
     return "".join(parts) + "}\n"
 
 
-def _tuples(rows: np.ndarray, form: str) -> str:
+def tuples(rows: np.ndarray, form: str) -> str:
+    """Rows as USD's text form has them."""
     return "[" + ", ".join(f"({', '.join(format(v, form) for v in row)})" for row in rows) + "]"

@@ -5,7 +5,6 @@ import os
 import re
 import shutil
 import subprocess
-import time
 from pathlib import Path
 
 import pytest
@@ -166,10 +165,8 @@ def test_the_lock_lasts_as_long_as_a_guard(tmp_path: Path, monkeypatch: pytest.M
     toy = Toy(tmp_path / "toy", {"one": stage("one", "word")}, word="one\n")
     with run.alone(toy.folder):
         heir = subprocess.Popen(["sleep", "1.5"], close_fds=False)
-    start = time.monotonic()
     with run.alone(toy.folder):
-        assert time.monotonic() - start > 0.7
-    heir.wait(5)
+        assert heir.wait(0.5) == 0
 
 
 def test_elsewhere_it_says_so(tmp_path: Path) -> None:

@@ -43,7 +43,6 @@ def test_it_counts_rollouts_and_launches(monkeypatch, law: str) -> None:
     assert [entry["environments"] for entry in result["batches"]] == [2, 4]
     for entry in result["batches"]:
         assert all(np.isfinite(value) and value > 0 for value in entry.values())
-        assert entry["rollouts_with_loss_per_s"] < entry["launches_per_s"]
         for what in ("rollouts", "rollouts_with_loss"):
             rate = entry["environments"] / entry[f"{what}_s"]
             assert entry[f"{what}_per_s"] == pytest.approx(rate)

@@ -18,7 +18,7 @@ from pipeline.identify.posterior.evidence import load_observed
 from pipeline.identify.posterior.identify import fit_posterior
 from pipeline.identify.results.estimate import save_estimate
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.params.identification import parameter_names
 from stages.start import run, started
 
@@ -26,7 +26,7 @@ from stages.start import run, started
 def main() -> None:
     params, band, method = started("band", "method")
     layout, law = Layout(), params.methods[method].law
-    explored = History.load(method, parameter_names(law), made(layout.history(band, method)))
+    explored = Evaluations.load(method, parameter_names(law), made(layout.history(band, method)))
     sling, episodes = sling_of_method(params, band, method), load_episodes(band)
     evidence = load_observed(layout.observed(band))
     density = fit_posterior(

@@ -12,7 +12,7 @@ from __future__ import annotations
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout, made
 from pipeline.identify.results.estimate import load_estimate
-from pipeline.identify.search.history import History, theta_content
+from pipeline.identify.search.evaluations import Evaluations, theta_content
 from pipeline.params.identification import parameter_names
 from pipeline.params.provenance import settings_of
 from stages.start import run, started
@@ -22,7 +22,7 @@ def main() -> None:
     params, band, method = started("band", "method")
     method_params, layout = params.methods[method], Layout()
     names = parameter_names(method_params.law)
-    evaluations = History.load(method, names, made(layout.evaluations(band, method)))
+    evaluations = Evaluations.load(method, names, made(layout.evaluations(band, method)))
     estimate = load_estimate(layout.confidence(band, method))
     if not method_params.mounting:  # the clamps were left as `setup` says
         estimate["mounted"] = False

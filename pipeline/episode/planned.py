@@ -75,6 +75,7 @@ def planned_pull(
     """
     period = params.duration / params.samples
     grasp, lifted = REST, REST + LIFT_TIME
+    taken = grasp + GRASP_TIME
     legs = legs_of(dips, float(np.hypot(*draw)))
     shares = np.array([0.0, *(leg.share for leg in legs)])
     ways = np.diff(shares)
@@ -85,9 +86,9 @@ def planned_pull(
     end = release + params.tail + SPARE
     time = period * (np.arange(int(end / period)) + 0.5)
     start, below, there = (np.array(place) for place in ([0, 0, hanging], [0, 0, 0], [0, *draw]))
-    position = start + np.outer(_eased(time, grasp + GRASP_TIME, lifted), below - start)
+    position = start + np.outer(minimum_jerk((time - taken) / (lifted - taken)), below - start)
     for way, begin, until in zip(ways, ends[:-1], ends[1:], strict=True):
-        position += np.outer(_eased(time, begin, until), way * there)
+        position += np.outer(minimum_jerk((time - begin) / (until - begin)), way * there)
     frames = np.arange(int(time[-1] * frame_rate)) / frame_rate
     return Episode(
         band=band,
@@ -105,7 +106,11 @@ def planned_pull(
     )
 
 
-def _eased(time: np.ndarray, start: float, end: float) -> np.ndarray:
-    """Rise from 0 to 1, at rest at both ends, with continuous acceleration, shape (T,)."""
-    part = np.clip((time - start) / (end - start), 0, 1)
+def minimum_jerk(part: np.ndarray | float) -> np.ndarray:
+    """Share of a way that is behind at shares (...) of its time, 0 before it and 1 after.
+
+    The way of the least mean squared jerk between two places of rest (Flash and Hogan 1985,
+    10.1523/JNEUROSCI.05-07-01688.1985): speed and acceleration are 0 at both ends.
+    """
+    part = np.clip(part, 0, 1)
     return part**3 * (10 - 15 * part + 6 * part**2)

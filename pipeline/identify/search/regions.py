@@ -1,4 +1,4 @@
-"""Promising regions of a history: centres by non-maximum suppression, covariances of neighbours.
+"""Promising regions of a search: centres by non-maximum suppression, covariances of neighbours.
 
 Distances are those of the unit cube; failed rows count for nothing.
 """
@@ -28,7 +28,7 @@ class Region:
         mu: Centre in the unit cube, shape (D,).
         sigma: Positive definite covariance, shape (D, D).
         loss: Of the centre.
-        members: Rows of the history that the covariance is of, nearest first; the centre is one.
+        members: Evaluated rows that the covariance is of, nearest first; the centre is one.
     """
 
     mu: np.ndarray
@@ -43,14 +43,14 @@ def regions_asked(method_params: MethodParams, optimizer: OptimizerParams) -> in
 
 
 def regions_of(
-    method_params: MethodParams, optimizer: OptimizerParams, history
+    method_params: MethodParams, optimizer: OptimizerParams, evaluations
 ) -> tuple[list[Region], int]:
     """Where a method's refinement begins, and how many regions were asked for.
 
     Args:
         about: params.yaml's `methods.<name>`.
         optimizer: params.yaml's `optimizer`.
-        history: The `History` of what its exploration evaluated, on its free axes.
+        evaluations: The `Evaluations` of its exploration, on its free axes.
 
     Raises:
         UserError: As `find_regions`.
@@ -60,7 +60,7 @@ def regions_of(
         "k_top": regions_asked(method_params, optimizer),
         "covariance": method_params.covariance,
     }
-    return find_regions(history.unit, history.total, **settings), settings["k_top"]
+    return find_regions(evaluations.unit, evaluations.total, **settings), settings["k_top"]
 
 
 def find_regions(

@@ -16,8 +16,8 @@ from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.optimizers.cma.refine import refine
 from pipeline.identify.posterior.identify import Identified, fit_posterior
 from pipeline.identify.posterior.launches import Evidence
-from pipeline.identify.search.explore import explore
 from pipeline.identify.search.evaluations import Evaluations
+from pipeline.identify.search.explore import explore
 from pipeline.identify.search.regions import regions_of
 from pipeline.params import Params
 from pipeline.params.identification import LEAST_SQUARES

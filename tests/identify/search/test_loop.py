@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from pipeline.base.errors import UserError
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.search.build import build
-from pipeline.identify.search.explore import rollouts_of
 from pipeline.identify.search.evaluations import Evaluations, theta_content
+from pipeline.identify.search.explore import rollouts_of
 from pipeline.identify.search.loop import latin_hypercube, search
 from pipeline.params import load
 from tests.identify.search import functions

@@ -29,8 +29,8 @@ from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.loss import TERMS
 from pipeline.identify.objective.session import service
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.search.explore import rollouts_of
 from pipeline.identify.search.evaluations import Evaluations
+from pipeline.identify.search.explore import rollouts_of
 from pipeline.params import load
 from pipeline.params.identification import OUR_ENGINE
 from pipeline.simulator.launch import launch

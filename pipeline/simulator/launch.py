@@ -46,6 +46,13 @@ class Launches:
     separation_z: np.ndarray
     failure: list[str | None]
 
+    def __getitem__(self, chosen: np.ndarray) -> Launches:
+        """Launches by their numbers or a mask."""
+        columns = {
+            field.name: np.array(getattr(self, field.name))[chosen] for field in fields(self)
+        }
+        return Launches(**columns | {"failure": columns["failure"].tolist()})
+
 
 def ballistic_landing(y, z, vy, vz, floor: float):
     """Where a free projectile from (y, z) with (vy, vz) meets z = floor, without drag."""
@@ -119,14 +126,14 @@ def launch(
     )  # fmt: skip
     schedule = schedule_of(setup, refine)
 
-    def launched(place: str, share: np.ndarray) -> np.ndarray:
+    def launched_on(place: str, share: np.ndarray) -> np.ndarray:
         options = Options(place, workers, launching=True, double=double)
         return run(band, schedule, slings[share], options=options).lanes
 
     devices = [device] if isinstance(device, str) else device[: max(count // SHARE, 1)]
     shares = np.array_split(np.arange(count), len(devices))
     with ThreadPoolExecutor(len(devices)) as pool:
-        lanes = np.concatenate(list(pool.map(launched, devices, shares)))
+        lanes = np.concatenate(list(pool.map(launched_on, devices, shares)))
     return limited(outcomes(band, setup, parameters, lanes, draws), max_force)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from pipeline.launching.surface.landing_map import Launched, Launcher
+from pipeline.launching.surface.landing_map import Launcher, SimulatedLaunches
 from pipeline.simulator.launch import landing_gradient
 from pipeline.simulator.parameters import Parameters
 
@@ -97,6 +97,6 @@ def shortest(values: np.ndarray, level: float = LEVEL) -> np.ndarray:
     return values[[first, first + inside]]
 
 
-def _landing(launched: Launched) -> np.ndarray:
+def _landing(launched: SimulatedLaunches) -> np.ndarray:
     good = np.array([failure is None for failure in launched.failure])
     return np.where(good, np.asarray(launched.landing_y, float), np.nan)

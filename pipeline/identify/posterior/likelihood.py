@@ -208,9 +208,10 @@ class Likelihood:
         self._frames = _that_count(episode)
 
     def aligned(self, parameters: Parameters) -> Likelihood:
-        """Copy with the camera's clock where these parameters, one sample, show the recoil best.
+        """Set the camera's clock, in a copy, to where these parameters show the recoil best.
 
-        A fit that starts a picture away from there can end in another minimum: a picture from
+        `parameters` are one sample. Where no other clock shows it clearly better, the likelihood
+        itself. A fit that starts a picture away from there can end in another minimum: a picture from
         before the release does not change with the camera's clock. Raises Failed.
         """
         best = recoil_seen(self.episode, self.tolerances.camera, parameters, self.sling)

@@ -109,12 +109,12 @@ class Evaluations:
         return self.table.slice(int(np.argmin(total)), 1).to_pylist()[0]
 
 
-def theta_content(evaluations: Evaluations, band: str, estimate: dict) -> dict:
+def theta_content(evaluations: Evaluations, band: str, entries: dict) -> dict:
     """What a θ file holds: the mode of a density where one was fitted, else the best evaluation.
 
     Args:
         evaluations: Everything that a search evaluated; a density's mode is a phase of its own.
-        estimate: What else the search says of θ (identify/results/estimate.py).
+        entries: What else the search says of θ (identify/results/confidence_file.py).
     """
     mode = evaluations.of_phase(LEAST_SQUARES)
     chosen = mode if len(mode.total) else evaluations
@@ -130,5 +130,5 @@ def theta_content(evaluations: Evaluations, band: str, estimate: dict) -> dict:
         "failed": int(np.isinf(chosen.total).sum()),
         "found": {name: best[name] for name in ("phase", "generation", "solver")},
         "confidence": None,
-        **estimate,
+        **entries,
     }

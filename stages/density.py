@@ -43,7 +43,7 @@ def main() -> None:
     )
     mode = evaluated_mode(params, method, sling, episodes[0], density)
     explored.followed_by(mode).save(layout.evaluations(band, method))
-    entries, samples = entries_of(params, density, explored), density.parameters
+    entries, samples = entries_of(density, explored), density.parameters
     entries["made_with"] = evidence.made_with if evidence else {}
     save_confidence(layout.confidence(band, method), band, entries, samples)
 

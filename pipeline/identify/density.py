@@ -31,7 +31,7 @@ def evaluated_mode(
     return evaluations
 
 
-def entries_of(params: Params, density: Identified, explored: Evaluations) -> dict:
+def entries_of(density: Identified, explored: Evaluations) -> dict:
     """The entries of the θ file that no table of evaluations holds."""
     return theta_entries(density) | {
         "confidence": confidence(density),

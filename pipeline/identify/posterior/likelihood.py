@@ -192,11 +192,7 @@ class Likelihood:
     """
 
     def __init__(
-        self,
-        episode: Episode,
-        sling: ClampedBand,
-        cutoff: float,
-        friction: float,
+        self, episode: Episode, sling: ClampedBand, cutoff: float, friction: float
     ) -> None:
         """`friction` is what the method fixes, of the pads."""
         self.episode, self.cutoff = episode, cutoff
@@ -211,8 +207,8 @@ class Likelihood:
         """Set the camera's clock, in a copy, to where these parameters show the recoil best.
 
         `parameters` are one sample. Where no other clock shows it clearly better, the likelihood
-        itself. A fit that starts a picture away from there can end in another minimum: a picture from
-        before the release does not change with the camera's clock. Raises Failed.
+        itself is returned. A fit that starts a picture away can end in another minimum: a picture
+        from before the release does not change with the camera's clock. Raises Failed.
         """
         best = recoil_seen(self.episode, self.tolerances.camera, parameters, self.sling)
         if best is None:

@@ -24,10 +24,7 @@ class ConfidenceFile(PosteriorFile):
 
 
 def save_confidence(
-    path: Path,
-    band: str,
-    entries: dict,
-    samples: Parameters | None = None,
+    path: Path, band: str, entries: dict, samples: Parameters | None = None
 ) -> None:
     """Write a `ConfidenceFile`."""
     names, values = ([], []) if samples is None else ([*samples.names], samples.values.tolist())

@@ -48,19 +48,23 @@ def regions_of(
     """Where a method's refinement begins, and how many regions were asked for.
 
     Args:
-        about: params.yaml's `methods.<name>`.
+        method_params: params.yaml's `methods.<name>`.
         optimizer: params.yaml's `optimizer`.
         evaluations: The `Evaluations` of its exploration, on its free axes.
 
     Raises:
         UserError: As `find_regions`.
     """
-    settings = {name: getattr(optimizer, name) for name in ("k_nn", "delta")}
-    settings |= {
-        "k_top": regions_asked(method_params, optimizer),
-        "covariance": method_params.covariance,
-    }
-    return find_regions(evaluations.unit, evaluations.total, **settings), settings["k_top"]
+    count = regions_asked(method_params, optimizer)
+    regions = find_regions(
+        evaluations.unit,
+        evaluations.total,
+        k_top=count,
+        k_nn=optimizer.k_nn,
+        delta=optimizer.delta,
+        covariance=method_params.covariance,
+    )
+    return regions, count
 
 
 def find_regions(

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.episode.episode import Episode
 from pipeline.params.lab import Dip
 from pipeline.params.recording import EpisodeParams
@@ -104,13 +105,3 @@ def planned_pull(
         camera=np.array(CAMERA),
         metadata={"input": {"file": "planned"}},
     )
-
-
-def minimum_jerk(part: np.ndarray | float) -> np.ndarray:
-    """Share of a way that is behind at shares (...) of its time, 0 before it and 1 after.
-
-    The way of the least mean squared jerk between two places of rest (Flash and Hogan 1985,
-    10.1523/JNEUROSCI.05-07-01688.1985): speed and acceleration are 0 at both ends.
-    """
-    part = np.clip(part, 0, 1)
-    return part**3 * (10 - 15 * part + 6 * part**2)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.base.errors import UserError
-from pipeline.episode.planned import minimum_jerk
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters

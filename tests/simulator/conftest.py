@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.episode.episode import Episode
-from pipeline.episode.planned import minimum_jerk
 from pipeline.simulator import ClampedBand, LaunchSetup
 from pipeline.simulator.model import TETRAHEDRA
 

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.episode.episode import Episode
-from pipeline.episode.planned import minimum_jerk
 from pipeline.params import load
 from pipeline.simulator.model import ClampedBand, ClampValues
 from tests.project import DEFAULTS

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base.errors import UserError
-from pipeline.episode.planned import minimum_jerk
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.export.mesh import Tube
 from pipeline.export.replay import Shot
 from pipeline.export.usd import RATE, UsdBand

@@ -19,7 +19,7 @@ import numpy as np
 
 from pipeline.base import errors
 from pipeline.base.errors import UserError
-from pipeline.episode.planned import minimum_jerk
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.export.mesh import Tube
 from pipeline.identify.results.mounting import load_sling
 from pipeline.params import Params, load

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pipeline.episode.planned import minimum_jerk
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.export.mesh import Tube
 from pipeline.simulator.interaction import GRASP_BLEND, interact
 from pipeline.simulator.model import GRAVITY, ClampedBand

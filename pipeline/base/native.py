@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable
 from functools import cache
 from pathlib import Path
 from threading import Lock
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import warp as wp
 
@@ -82,6 +82,11 @@ def built_once(build: Callable[..., Built]) -> Callable[..., Built]:
             return once(*key)
 
     return built
+
+
+def empty(size: int, dtype: Any, device: str) -> wp.array:
+    """An array for results there."""
+    return wp.empty(size, dtype=dtype, device=device)
 
 
 def run_kernel(kernel: wp.Kernel, blocks: int, inputs: list, device: str) -> None:

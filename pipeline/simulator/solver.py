@@ -260,7 +260,7 @@ class _Work:
         """Step the slings of rows from `begin` to `end`; arrays (slings, width) of RETURNED."""
         import warp as wp
 
-        from pipeline.base.native import run_kernel
+        from pipeline.base.native import empty, run_kernel
 
         size, device = end - begin, self.options.device
         scalar = wp.dtype_from_numpy(self.dtype)
@@ -269,7 +269,7 @@ class _Work:
         }
         for name in self.widths.keys() - arrays.keys():
             length = size * self.lanes * self.widths[name]
-            arrays[name] = wp.empty(length, dtype=scalar, device=device)
+            arrays[name] = empty(length, scalar, device)
         given = self.arrays()
         for name, values in arrays.items():
             setattr(given, name, values)

@@ -55,7 +55,7 @@ class DeviceTerms:
         """
         import warp as wp
 
-        from pipeline.base.native import run_kernel
+        from pipeline.base.native import empty, run_kernel
         from pipeline.identify.objective.kernel import terms_kernel
 
         line, force = rollouts.center_line, rollouts.force
@@ -68,8 +68,8 @@ class DeviceTerms:
         arrays.samples, arrays.frames = len(matrix.indptr) - 1, self._chamfer.frames
         arrays.both = int(self._chamfer.symmetric)
         filtered = count * 3 * arrays.samples
-        arrays.filtered = wp.empty(filtered, dtype=wp.float64, device=device)
-        arrays.terms = terms = wp.empty(count * 3, dtype=wp.float64, device=device)
+        arrays.filtered = empty(filtered, wp.float64, device)
+        arrays.terms = terms = empty(count * 3, wp.float64, device)
         run_kernel(kernel, count, [arrays], device)
         return terms.numpy().reshape(count, 3)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -48,10 +49,11 @@ class Launches:
 
     def __getitem__(self, chosen: np.ndarray) -> Launches:
         """Launches by their numbers or a mask."""
-        columns = {
+        columns: dict[str, Any] = {
             field.name: np.array(getattr(self, field.name))[chosen] for field in fields(self)
         }
-        return Launches(**columns | {"failure": columns["failure"].tolist()})
+        columns["failure"] = columns["failure"].tolist()
+        return Launches(**columns)
 
 
 def ballistic_landing(y, z, vy, vz, floor: float):

@@ -250,7 +250,7 @@ def launch(arguments: argparse.Namespace) -> Done:
         arguments.refuse("give --method or --theta, not both")
     expect_known(params, "method", method, called="--method")
     theta = arguments.theta or Layout().theta(arguments.band, method)
-    answer = launch.launched(params, arguments.band, theta, arguments.draw)
+    answer = launch.launch_output(params, arguments.band, theta, arguments.draw)
     return safety.shown(answer, arguments.json)
 
 

@@ -29,7 +29,7 @@ def expect_above_floor(params: Params, draw: tuple[float, float]) -> None:
         )
 
 
-def launched(
+def launch_output(
     params: Params, band: str, theta: Path, draw: tuple[float, float], root: str | Path = "."
 ) -> dict:
     """What `sling launch --json` says of a draw (y, z) [m]; `warnings` are of app.safety.

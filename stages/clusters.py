@@ -9,7 +9,7 @@ start in each region.
 from __future__ import annotations
 
 from pipeline.base.layout import Layout, made
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.identify.search.regions import regions_of, save_regions
 from pipeline.params.identification import parameter_names
 from stages.start import run, started
@@ -21,8 +21,8 @@ def main() -> None:
     names = tuple(
         name for name in parameter_names(method_params.law) if name not in method_params.fixed
     )
-    explored = History.load(method, names, made(layout.history(band, method)))
-    explored.best()  # says why, where all failed
+    explored = Evaluations.load(method, names, made(layout.history(band, method)))
+    explored.best_row()  # says why, where all failed
     regions, requested = regions_of(method_params, params.optimizer, explored)
     save_regions(layout.clusters(band, method), names, regions, requested)
     print(f"{band} {method}: {len(regions)} regions, best loss {regions[0].loss:.5g}")

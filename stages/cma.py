@@ -13,8 +13,8 @@ from __future__ import annotations
 from pipeline.base.layout import Layout, made
 from pipeline.identify.objective.session import load_episode, service
 from pipeline.identify.optimizers.cma.refine import refine
-from pipeline.identify.results.estimate import law_entries, save_estimate
-from pipeline.identify.search.history import History
+from pipeline.identify.results.confidence_file import law_entries, save_confidence
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.identify.search.regions import load_regions
 from pipeline.params.identification import parameter_names
 from stages.start import run, started
@@ -25,11 +25,11 @@ def main() -> None:
     law, layout = params.methods[method].law, Layout()
     regions, _ = load_regions(made(layout.clusters(band, method)))
     names = parameter_names(law)
-    explored = History.load(method, names, made(layout.history(band, method)))
+    explored = Evaluations.load(method, names, made(layout.history(band, method)))
     evaluate = service("cma", band, method, params, params.optimizer.cma_rollouts)
     refined = refine(params, method, regions, evaluate)
     explored.followed_by(refined).save(layout.evaluations(band, method))
-    save_estimate(layout.confidence(band, method), band, law_entries(load_episode(band), law))
+    save_confidence(layout.confidence(band, method), band, law_entries(load_episode(band), law))
 
 
 if __name__ == "__main__":

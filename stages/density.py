@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from pipeline.base.layout import Layout, made
 from pipeline.base.machine import workers
-from pipeline.identify.density import estimate_of, evaluated_mode
+from pipeline.identify.density import entries_of, evaluated_mode
 from pipeline.identify.objective.session import load_episodes
 from pipeline.identify.posterior.evidence import load_observed
 from pipeline.identify.posterior.identify import fit_posterior
-from pipeline.identify.results.estimate import save_estimate
+from pipeline.identify.results.confidence_file import save_confidence
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.params.identification import parameter_names
 from stages.start import run, started
 
@@ -26,7 +26,7 @@ from stages.start import run, started
 def main() -> None:
     params, band, method = started("band", "method")
     layout, law = Layout(), params.methods[method].law
-    explored = History.load(method, parameter_names(law), made(layout.history(band, method)))
+    explored = Evaluations.load(method, parameter_names(law), made(layout.history(band, method)))
     sling, episodes = sling_of_method(params, band, method), load_episodes(band)
     evidence = load_observed(layout.observed(band))
     density = fit_posterior(
@@ -43,9 +43,9 @@ def main() -> None:
     )
     mode = evaluated_mode(params, method, sling, episodes[0], density)
     explored.followed_by(mode).save(layout.evaluations(band, method))
-    estimate, samples = estimate_of(params, density, explored), density.parameters
-    estimate["made_with"] = evidence.made_with if evidence else {}
-    save_estimate(layout.confidence(band, method), band, estimate, samples)
+    entries, samples = entries_of(density, explored), density.parameters
+    entries["made_with"] = evidence.made_with if evidence else {}
+    save_confidence(layout.confidence(band, method), band, entries, samples)
 
 
 if __name__ == "__main__":

@@ -19,8 +19,8 @@ from stages.start import run, started
 def main() -> None:
     params, band, method = started("band", "method")
     rollouts = rollouts_of(params, method)
-    history = explore(params, method, service("history", band, method, params, rollouts))
-    history.save(Layout().history(band, method))
+    explored = explore(params, method, service("history", band, method, params, rollouts))
+    explored.save(Layout().history(band, method))
 
 
 if __name__ == "__main__":

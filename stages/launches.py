@@ -24,7 +24,7 @@ def main() -> None:
     params, band, method = started("band", "method")
     targets = np.repeat(params.trials.targets, params.trials.repeats).tolist()
     aimed = trials.aimed(Stored(band, method), targets)
-    launched = trials.launched(aimed, partial(_launch, band))
+    launched = trials.launch_virtually(aimed, partial(_launch, band))
     launched.save(Layout().launches(band, method))
     landed = sum(landing is not None for landing in launched.every("landing"))
     print(f"{band} {method}: {landed} of {len(targets)} launches landed on the rig")

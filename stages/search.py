@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from pipeline.base.layout import Layout
 from pipeline.identify.objective.session import load_episode, service
-from pipeline.identify.results.estimate import law_entries, save_estimate
+from pipeline.identify.results.confidence_file import law_entries, save_confidence
 from pipeline.identify.search.explore import explore, rollouts_of
 from stages.start import run, started
 
@@ -22,8 +22,8 @@ def main() -> None:
     layout, rollouts = Layout(), rollouts_of(params, method)
     evaluations = explore(params, method, service("search", band, method, params, rollouts))
     evaluations.save(layout.evaluations(band, method))
-    estimate = law_entries(load_episode(band), params.methods[method].law)
-    save_estimate(layout.confidence(band, method), band, estimate)
+    entries = law_entries(load_episode(band), params.methods[method].law)
+    save_confidence(layout.confidence(band, method), band, entries)
 
 
 if __name__ == "__main__":

@@ -82,10 +82,10 @@ def _end_with_dvc() -> None:
     import psutil
 
     try:
-        inner = psutil.Process()  # or the shell around us, if it stays
-        while (dvc := inner.parent()) and OF_DVC in dvc.environ():
-            inner = dvc
-        while dvc is None or inner.ppid() == dvc.pid:
+        outermost = psutil.Process()  # or the shell around us, if it stays
+        while (dvc := outermost.parent()) and OF_DVC in dvc.environ():
+            outermost = dvc
+        while dvc is None or outermost.ppid() == dvc.pid:
             time.sleep(0.5)
     except psutil.AccessDenied:
         return

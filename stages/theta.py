@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout, made
-from pipeline.identify.results.estimate import load_estimate
-from pipeline.identify.search.history import History, theta_content
+from pipeline.identify.results.confidence_file import load_confidence
+from pipeline.identify.search.evaluations import Evaluations, theta_content
 from pipeline.params.identification import parameter_names
 from pipeline.params.provenance import settings_of
 from stages.start import run, started
@@ -22,12 +22,12 @@ def main() -> None:
     params, band, method = started("band", "method")
     method_params, layout = params.methods[method], Layout()
     names = parameter_names(method_params.law)
-    evaluations = History.load(method, names, made(layout.evaluations(band, method)))
-    estimate = load_estimate(layout.confidence(band, method))
+    evaluations = Evaluations.load(method, names, made(layout.evaluations(band, method)))
+    entries = load_confidence(layout.confidence(band, method))
     if not method_params.mounting:  # the clamps were left as `setup` says
-        estimate["mounted"] = False
-    content = theta_content(evaluations, band, estimate)
-    content["made_with"] = settings_of(params, band, method) | estimate.get("made_with", {})
+        entries["mounted"] = False
+    content = theta_content(evaluations, band, entries)
+    content["made_with"] = settings_of(params, band, method) | entries.get("made_with", {})
     write_json(layout.theta(band, method), content)
     print(f"{band} {method}: loss {content['loss']['total']:.5g}")
     intervals = (content["confidence"] or {}).get("parameters", {})

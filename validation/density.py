@@ -80,7 +80,7 @@ def calibrated_by(
     )
     density = identified.density
     if density is None:
-        best = identified.evaluations.best()
+        best = identified.evaluations.best_row()
         description = {"loss": {name: best[name] for name in (*TERMS, "total")}}
         return Calibrated(sling, setup, identified.theta), description
     description = posterior.confidence(density)

@@ -26,8 +26,8 @@ def _digest(path: Path) -> str:
     if path.is_file():
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
-    inside = sorted(inner for inner in path.rglob("*") if inner.is_file() and _counts(inner))
-    listing = "".join(f"{inner.relative_to(path)} {_digest(inner)}\n" for inner in inside)
+    inside = sorted(file for file in path.rglob("*") if file.is_file() and _counts(file))
+    listing = "".join(f"{file.relative_to(path)} {_digest(file)}\n" for file in inside)
     return hashlib.sha256(listing.encode()).hexdigest() if path.is_dir() else ""
 
 

@@ -66,7 +66,7 @@ def _theta(root: Path, band: str, method: str) -> Iterator[str]:
         method=method,
         theta=theta,
         confidence=theta.get("confidence") or {},
-        history=pd.read_parquet(layout.evaluations(band, method)),
+        evaluations=pd.read_parquet(layout.evaluations(band, method)),
     )
     searches = {band: {method: cast("Result", ready)}}
     yield _drawn("convergence", lambda path: search.convergence(path, searches, named))

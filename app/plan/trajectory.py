@@ -118,7 +118,7 @@ class Trajectory:
         largest = np.zeros(len(rate.x) - 1)
         for i, width in enumerate(np.diff(rate.x)):
             square = sum(np.convolve(axis, axis) for axis in rate.c[:, i].T)
-            inner = np.clip(np.roots(np.polyder(square)).real, 0.0, width)
-            places = np.concatenate([[0.0, width], inner])
+            extremes = np.clip(np.roots(np.polyder(square)).real, 0.0, width)
+            places = np.concatenate([[0.0, width], extremes])
             largest[i] = np.sqrt(max(np.polyval(square, places).max(), 0.0))
         return largest.reshape(len(self.phases), -1).max(axis=1)

@@ -32,8 +32,8 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     with _temporary(path) as temporary:
         temporary.mkdir()
         yield temporary
-        for inner in (*temporary.rglob("*"), temporary):
-            _sync(inner)
+        for entry in (*temporary.rglob("*"), temporary):
+            _sync(entry)
         shutil.rmtree(path, ignore_errors=True)
         os.replace(temporary, path)
         _sync(path.parent)

@@ -89,7 +89,7 @@ def empty(size: int, dtype: Any, device: str) -> wp.array:
     return wp.empty(size, dtype=dtype, device=device)
 
 
-def launch(kernel: wp.Kernel, blocks: int, inputs: list, device: str) -> None:
+def run_kernel(kernel: wp.Kernel, blocks: int, inputs: list, device: str) -> None:
     """Run blocks: each is one thread of SIMD vectors on the CPU, a warp of 32 threads on CUDA."""
     threads = 32 if device.startswith("cuda") else 1
     with _one_at_a_time:  # Warp's cache has one binary for each number of threads a block

@@ -31,10 +31,7 @@ class Pool(ProcessPoolExecutor):
         """
         self.workers = workers or cores()
         super().__init__(
-            self.workers,
-            get_context("spawn"),
-            initializer=_begin,
-            initargs=(begin, arguments),
+            self.workers, get_context("spawn"), initializer=_begin, initargs=(begin, arguments)
         )
 
     def map(

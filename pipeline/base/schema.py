@@ -167,12 +167,10 @@ def _closest(path: Sequence[str | int], model: type[Section]) -> str:
     """The known key that is most like the unknown one at the end of `path`."""
     kind: Any = model
     for part in path[:-1]:
-        is_section = isinstance(kind, type) and issubclass(kind, BaseModel)
-        inner = [
-            argument for argument in get_args(kind) if argument is not Ellipsis
-        ]  # of a list, or a mapping
-        kind = kind.model_fields[str(part)].annotation if is_section else inner[-1]
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            kind = kind.model_fields[str(part)].annotation
+        else:  # a list, or a mapping
+            kind = [argument for argument in get_args(kind) if argument is not Ellipsis][-1]
         if isinstance(kind, UnionType):  # a section, or null
             kind = get_args(kind)[0]
-    fields_of_kind = list(kind.model_fields)
-    return difflib.get_close_matches(str(path[-1]), fields_of_kind, n=1, cutoff=0)[0]
+    return difflib.get_close_matches(str(path[-1]), list(kind.model_fields), n=1, cutoff=0)[0]

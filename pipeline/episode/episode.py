@@ -70,10 +70,7 @@ class Episode:
             for axis, values in zip("xyz", getattr(self, name).T, strict=True):
                 signals[f"{name}_{axis}"] = pa.array(values, pa.float64())
         signals["opening"] = pa.array(self.opening, pa.float64())
-        clouds = {
-            "t": pa.array(self.cloud_time, pa.float64()),
-            "points": _nested(self.clouds),
-        }
+        clouds = {"t": pa.array(self.cloud_time, pa.float64()), "points": _nested(self.clouds)}
         header = {
             "version": SCHEMA_VERSION,
             "band": self.band,

@@ -186,8 +186,8 @@ def _joined(separate: list[InteractionPhase]) -> list[InteractionPhase]:
     return joined
 
 
-def turns(way: np.ndarray, least: float = TURN) -> list[int]:
-    """Samples at which a way (T,) turns by `least` or more, with the first and the last one.
+def turns(way: np.ndarray) -> list[int]:
+    """Samples at which a way (T,) turns by TURN or more, with the first and the last one.
 
     It grows at first.
     """
@@ -196,7 +196,7 @@ def turns(way: np.ndarray, least: float = TURN) -> list[int]:
         further = sign * (place - way[extreme])
         if further >= 0:
             extreme = i
-        elif -further > least:
+        elif -further > TURN:
             places.append(extreme)
             extreme, sign = i, -sign
     return [*places, len(way) - 1]

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.episode.episode import Episode
 from pipeline.params.lab import Dip
 from pipeline.params.recording import EpisodeParams
@@ -75,6 +76,7 @@ def planned_pull(
     """
     period = params.duration / params.samples
     grasp, lifted = REST, REST + LIFT_TIME
+    taken = grasp + GRASP_TIME
     legs = legs_of(dips, float(np.hypot(*draw)))
     shares = np.array([0.0, *(leg.share for leg in legs)])
     ways = np.diff(shares)
@@ -85,9 +87,9 @@ def planned_pull(
     end = release + params.tail + SPARE
     time = period * (np.arange(int(end / period)) + 0.5)
     start, below, there = (np.array(place) for place in ([0, 0, hanging], [0, 0, 0], [0, *draw]))
-    position = start + np.outer(_eased(time, grasp + GRASP_TIME, lifted), below - start)
+    position = start + np.outer(minimum_jerk((time - taken) / (lifted - taken)), below - start)
     for way, begin, until in zip(ways, ends[:-1], ends[1:], strict=True):
-        position += np.outer(_eased(time, begin, until), way * there)
+        position += np.outer(minimum_jerk((time - begin) / (until - begin)), way * there)
     frames = np.arange(int(time[-1] * frame_rate)) / frame_rate
     return Episode(
         band=band,
@@ -103,9 +105,3 @@ def planned_pull(
         camera=np.array(CAMERA),
         metadata={"input": {"file": "planned"}},
     )
-
-
-def _eased(time: np.ndarray, start: float, end: float) -> np.ndarray:
-    """Rise from 0 to 1, at rest at both ends, with continuous acceleration, shape (T,)."""
-    part = np.clip((time - start) / (end - start), 0, 1)
-    return part**3 * (10 - 15 * part + 6 * part**2)

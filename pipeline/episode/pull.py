@@ -61,10 +61,11 @@ def _from_fork(first: float, time: np.ndarray, way: np.ndarray, bends: list[int]
 
 def deepest_draw(episodes: Iterable[Episode]) -> float:
     """How far from the fork hands held a band at most [m]."""
-    held = [
-        episode.position[
-            (episode.time >= episode.grasp_time) & (episode.time <= episode.release_time)
-        ]
-        for episode in episodes
-    ]
-    return float(np.linalg.norm(np.concatenate(held), axis=1).max())
+    return float(np.linalg.norm(held_positions(episodes), axis=1).max())
+
+
+def held_positions(episodes: Iterable[Episode]) -> np.ndarray:
+    """Positions of the hands while they held a band, shape (N, 3)."""
+    return np.concatenate(
+        [e.position[(e.time >= e.grasp_time) & (e.time <= e.release_time)] for e in episodes]
+    )

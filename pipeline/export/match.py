@@ -42,10 +42,10 @@ class DrawCompared:
         return {name: theirs / ours - 1 for name, (ours, theirs) in pairs.items()}
 
 
-def draws_of(model: CalibratedBand) -> np.ndarray:
-    """The draws (N, 2) of a grid over the box that land around the targets.
+def draws_of(model: CalibratedBand) -> tuple[np.ndarray, Launches]:
+    """Draws (N, 2) of a grid over the box that land around the targets, and their launches.
 
-    And that the arm may hold. Raises UserError where there are too few.
+    Those that the arm may hold. Raises UserError where there are too few.
     """
     setup, (near, far) = model.settings.setup, model.settings.policy.targets
     axes = [np.linspace(*box, GRID) for box in (setup.draw_y, setup.draw_z)]
@@ -59,7 +59,7 @@ def draws_of(model: CalibratedBand) -> np.ndarray:
             f"{model.band.name}: {good.sum()} of {len(draws)} draws of the box (setup.draw_y, "
             f"draw_z) land near policy.targets within setup.max_force; a match needs {LEAST}"
         )
-    return draws[good]
+    return draws[good], done[good]
 
 
 def within_limits(proof: Sequence[DrawCompared]) -> bool:
@@ -90,8 +90,7 @@ def matched(model: CalibratedBand) -> SpringChain:
     Raises:
         UserError: MuJoCo is not installed, or too few draws of the box land.
     """
-    draws = draws_of(model)
-    ours = model.launches(draws)
+    draws, ours = draws_of(model)
     chain = _fitted(SpringChain.of(model, draws, ours.hold_force), draws, ours)
     while (step := chain.stable_step) < chain.step:  # it is braked more than was thought
         chain = _fitted(replace(chain, step=step), draws, ours)

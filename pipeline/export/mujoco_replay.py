@@ -59,9 +59,9 @@ class MujocoBand:
         """The state as a keyframe."""
         return {"qpos": self.data.qpos.copy(), "ctrl": self.data.ctrl.copy()}
 
-    def hang(self, *, held: bool = False) -> None:
-        """Let the band hang at rest, beside the hand or in it."""
-        self._put(self.chain.hanging(), held, pouch=True)
+    def hang(self) -> None:
+        """Let the band hang at rest, beside the hand."""
+        self._put(self.chain.hanging(), False, pouch=True)
         self._settle(HANG)
         place = self.line[self.chain.edges // 2]
         self.data.qpos[self._hand] = self.data.ctrl[:] = place

@@ -48,7 +48,7 @@ def proven(
     Args:
         episode: None: a planned pull to the last draw of the proof.
     """
-    draws, shots = draws_of(model), replay.launches(proof, fly=True)
+    (draws, _), shots = draws_of(model), replay.launches(proof, fly=True)
     finer = replay.finer.launches(proof)
     moved = [half.landing / shot.landing - 1 for half, shot in zip(finer, shots, strict=True)]
     return Matched(

@@ -7,7 +7,7 @@ much it then holds and lands otherwise is computed here, with the calibrated sim
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,25 +19,11 @@ PAUSES = 1 / 3, 3.0, 10.0  # times that of the match
 FARTHER = 0.05  # m, of an earlier draw
 
 
-@dataclass(frozen=True)
-class StateChange:
-    """What another state of the band changes, beside the one of the match.
-
-    Attributes:
-        pause_s: From the end of the draw to the release [s].
-        drawn_before_m: The farthest earlier draw [m]; 0: there was none.
-        hold_force_change, landing_change: Largest relative change over the draws, signed.
-    """
-
-    pause_s: float
-    drawn_before_m: float
-    hold_force_change: float
-    landing_change: float
-
-
 def state_changes(model: CalibratedBand, draws: np.ndarray) -> list[dict[str, float]]:
     """What other pauses and earlier draws change at draws (N, 2); nothing of a law without memory.
 
+    One entry for each state: the pause from the end of the draw to the release, the farthest
+    earlier draw, 0 where there was none, and the largest relative changes over the draws, signed.
     Draws that do not land in either state are left out.
     """
     setup = model.launch_setup
@@ -52,15 +38,14 @@ def state_changes(model: CalibratedBand, draws: np.ndarray) -> list[dict[str, fl
     for state in states:
         history = replace(setup.history, **state)
         other = launch(model.sling, replace(setup, history=history), model.parameters, draws)
-        changes.append(
-            StateChange(
-                pause_s=history.pause,
-                drawn_before_m=float(np.max(history.deepest)),
-                hold_force_change=_largest(other.hold_force / matched.hold_force - 1),
-                landing_change=_largest(other.landing_y / matched.landing_y - 1),
-            )
-        )
-    return [{name: rounded(value) for name, value in asdict(change).items()} for change in changes]
+        change = {
+            "pause_s": history.pause,
+            "drawn_before_m": float(np.max(history.deepest)),
+            "hold_force_change": _largest(other.hold_force / matched.hold_force - 1),
+            "landing_change": _largest(other.landing_y / matched.landing_y - 1),
+        }
+        changes.append({name: rounded(value) for name, value in change.items()})
+    return changes
 
 
 def _largest(changes: np.ndarray) -> float:

@@ -35,6 +35,7 @@ from pipeline.export.chain import SpringChain
 from pipeline.export.match import DrawCompared, draws_of, within_limits
 from pipeline.export.mesh import Tube
 from pipeline.report.quantities import rounded
+from pipeline.simulator.launch import Launches
 from pipeline.simulator.model import GRAVITY
 
 RATE, ITERATIONS = 200, 64  # steps a second, of the solver: the paper's
@@ -99,8 +100,8 @@ class UsdMatch:
 
 def to_usd(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
     """<band>.usda, nodes.json, and README.md: what it is, and what it is not."""
-    draws = near_draws(model)
-    tension, stretch = SpringChain.tension(model, draws, model.launches(draws).hold_force)
+    draws, ours = near_draws(model)
+    tension, stretch = SpringChain.tension(model, draws, ours.hold_force)
     theta = model.parameters.sample()
     poisson = theta["poissons_ratio"]
     unit = np.pi * model.band.diameter**2 / 4 * nominal(stretch, poisson)
@@ -154,12 +155,11 @@ def to_usd(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict
     return content
 
 
-def near_draws(model: CalibratedBand) -> np.ndarray:
-    """Draws of `draws_of` (N, 2) that land near policy.targets; all where they are too few."""
-    draws, (near, far) = draws_of(model), model.settings.policy.targets
-    landing = model.launches(draws).landing_y
-    good = (landing > near / NEAR) & (landing < far * NEAR)
-    return draws[good] if good.sum() > 2 else draws
+def near_draws(model: CalibratedBand) -> tuple[np.ndarray, Launches]:
+    """What `draws_of` gives, near policy.targets alone; all where that is too few."""
+    (draws, ours), (near, far) = draws_of(model), model.settings.policy.targets
+    good = (ours.landing_y > near / NEAR) & (ours.landing_y < far * NEAR)
+    return (draws[good], ours[good]) if good.sum() > 2 else (draws, ours)
 
 
 def match_of(target: str) -> Callable[[CalibratedBand, UsdBand], UsdMatch | None] | None:

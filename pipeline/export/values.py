@@ -73,11 +73,7 @@ def without_slot(model: CalibratedBand) -> list[dict]:
     bending = "a solid band's" if rigidity is None else f"{rigidity:.2g} N m²"
     damping = f"{1e3 * theta['elasticity_damping']:.2g} ms, {theta['damping_scale']:.2g}"
     rows = [
-        (
-            "elasticity_damping, damping_scale",
-            damping,
-            "One damping time, of lengthening alone.",
-        ),
+        ("elasticity_damping, damping_scale", damping, "One damping time, of lengthening alone."),
         ("turn_damping", f"{theta['turn_damping']:.2g}", "None: turns of a spring cost nothing."),
         (
             "returned_share",
@@ -99,11 +95,7 @@ def without_slot(model: CalibratedBand) -> list[dict]:
             f"{angle:.0f} degrees, {bending}",
             "None: the chain bends freely, at its clamps too. The slack band hangs otherwise.",
         ),
-        (
-            "air",
-            f"{setup.air_density:.2g} kg/m³",
-            "The springs' damping, matched to landings.",
-        ),
+        ("air", f"{setup.air_density:.2g} kg/m³", "The springs' damping, matched to landings."),
     ]
     if model.parameters.law == RUBBER:
         rows = [*_of_rubber(model), *rows]

@@ -43,11 +43,10 @@ READ_ME = (
 
 def content_of(model: CalibratedBand) -> dict:
     """What the file holds."""
-    parameters, draws = model.parameters, draws_of(model)
+    parameters, (draws, done) = model.parameters, draws_of(model)
     theta = parameters.sample()
     shape = theta.get("mooney_share", 0.0), theta.get("upturn", 0.0)
     strength = theta["youngs_modulus"] * np.pi * model.band.diameter**2 / 4
-    done = model.launches(draws)
     return {
         "frames": export_values.FRAMES,
         "sizes": export_values.sizes(model),

@@ -9,7 +9,7 @@ from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.posterior.identify import Identified, confidence, theta_entries
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.params import Params
 from pipeline.params.identification import LEAST_SQUARES
 from pipeline.simulator.model import ClampedBand
@@ -18,20 +18,20 @@ from pipeline.simulator.parameters import EXTRA
 
 def evaluated_mode(
     params: Params, method: str, sling: ClampedBand, episode: Episode, density: Identified
-) -> History:
+) -> Evaluations:
     """The mode's loss, one row of the phase `least_squares`."""
     mode = density.mode.sample()
     box = SearchBox.of_method(params, method)
     box = replace(box, fixed={name: mode[name] for name in EXTRA})
     evaluate = Evaluator(episode, sling, EpisodeLoss.of(params, method, episode, sling), box)
-    history = History(method, box.names)
-    history.add(
+    evaluations = Evaluations(method, box.names)
+    evaluations.add(
         evaluate(box.unit_of(density.mode)), phase=LEAST_SQUARES, generation=density.fit.steps
     )
-    return history
+    return evaluations
 
 
-def estimate_of(params: Params, density: Identified, explored: History) -> dict:
+def entries_of(density: Identified, explored: Evaluations) -> dict:
     """The entries of the θ file that no table of evaluations holds."""
     return theta_entries(density) | {
         "confidence": confidence(density),

@@ -16,8 +16,8 @@ from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.optimizers.cma.refine import refine
 from pipeline.identify.posterior.identify import Identified, fit_posterior
 from pipeline.identify.posterior.launches import Evidence
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.identify.search.explore import explore
-from pipeline.identify.search.history import History
 from pipeline.identify.search.regions import regions_of
 from pipeline.params import Params
 from pipeline.params.identification import LEAST_SQUARES
@@ -36,13 +36,13 @@ class IdentifiedBand:
     """
 
     theta: Parameters
-    evaluations: History | None
+    evaluations: Evaluations | None
     density: Identified | None
 
 
 def evaluations_of(
     params: Params, method: str, evaluate: Callable[[np.ndarray], Evaluation]
-) -> History:
+) -> Evaluations:
     """Everything that the search of a method evaluates: exploration, then refinement if it has one.
 
     Args:
@@ -53,7 +53,7 @@ def evaluations_of(
     if method_params.search != "multistart":
         return explored
     free = SearchBox.of_method(params, method).free
-    on_free_axes = History(method, free, [explored.table])
+    on_free_axes = Evaluations(method, free, [explored.table])
     regions, _ = regions_of(method_params, params.optimizer, on_free_axes)
     return explored.followed_by(refine(params, method, regions, evaluate))
 

@@ -126,9 +126,9 @@ class OptimizerParams(Section):
 
     @model_validator(mode="after")
     def _budgets_suffice(self) -> OptimizerParams:
-        history = self.population * (self.generations + 1)
-        if self.k_nn > history:
-            raise refusal(f"k_nn must be at most population x (generations + 1) = {history}")
+        explored = self.population * (self.generations + 1)
+        if self.k_nn > explored:
+            raise refusal(f"k_nn must be at most population x (generations + 1) = {explored}")
         iteration = self.k_top * self.cma_population
         if self.cma_rollouts < iteration:
             raise refusal(f"cma_rollouts must be at least k_top x cma_population = {iteration}")

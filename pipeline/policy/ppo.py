@@ -6,7 +6,7 @@ from pipeline.params.launches import PolicyParams
 
 
 def settings(params: PolicyParams, state: list[str]) -> dict:
-    """Configuration of rsl_rl's runner.
+    """Configuration of rsl_rl's algorithm.
 
     Args:
         params: The `policy:` section of params.yaml.
@@ -18,7 +18,7 @@ def settings(params: PolicyParams, state: list[str]) -> dict:
         exploration |= {"std_type": "log", "learn_std": False}
     return {
         "num_steps_per_env": params.steps,
-        "save_interval": params.iterations,
+        "multi_gpu": None,
         "obs_groups": {"actor": state, "critic": state},
         "actor": {**network, "distribution_cfg": exploration},
         "critic": dict(network),

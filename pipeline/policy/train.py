@@ -10,12 +10,14 @@ from __future__ import annotations
 import contextlib
 import copy
 import io
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
-from rsl_rl.runners import OnPolicyRunner
+from rsl_rl.algorithms import PPO
 from torch import nn
 
 from pipeline.base.machine import one_thread
@@ -144,11 +146,75 @@ def train(
         )
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
             configured = settings(params, env.groups)
-            runner = OnPolicyRunner(env, configured, log_dir=None, device="cpu")
-        training = _Training(runner, env, params, progress, projectile)
-        runner.logger = training  # pyright: ignore[reportAttributeAccessIssue]
-        runner.learn(params.iterations)  # once: another call would start from stale observations
-    return training.result()
+            ppo = PPO.construct_algorithm(env.get_observations(), env, configured, "cpu")
+        network: Any = ppo.get_policy()
+        sizes = network.mlp, params.targets, surface
+        policy = Policy(*sizes) if projectile is None else ProjectilePolicy(*sizes, projectile)
+        checked = np.linspace(*params.targets, CHECKED_TARGETS)
+        rows: list[dict] = []
+        reasons: Counter[str] = Counter()
+        best, chosen, weights = -np.inf, 0, {}
+        for number, next_log_std in enumerate(_next_log_stds(params)):
+            mean_reward = _iterate(ppo, env, params.steps)
+            failures = env.take_failures()
+            reasons.update(failures)
+            worth, error, failed = earned(surface, policy.draws(checked), checked, params.reward)
+            rows.append(
+                {
+                    "iteration": number + 1,
+                    "mean_reward": mean_reward,
+                    "mean_error": error,
+                    "failed_targets": failed,
+                    "failures": sum(failures.values()),
+                    "learning_rate": float(ppo.learning_rate),
+                    "std": float(network.output_std.detach().mean()),
+                }
+            )
+            if next_log_std is not None:
+                with torch.no_grad():
+                    network.distribution.log_std_param.fill_(next_log_std)
+            if worth > best:
+                best, chosen, weights = worth, number, copy.deepcopy(policy.state_dict())
+            if progress:
+                progress.advance(1, summary(error))
+    policy.load_state_dict(weights)
+    return Trained(
+        policy=policy.eval(),
+        curve={name: [row[name] for row in rows] for name in rows[0]},
+        iteration=rows[chosen]["iteration"],
+        mean_error=rows[chosen]["mean_error"],
+        failures=dict(sorted(reasons.items())),
+    )
+
+
+def _iterate(ppo: PPO, env: SlingshotEnv, steps: int) -> float:
+    """Launch by the exploring policy and improve it; mean reward of the launches.
+
+    The loop of rsl_rl's OnPolicyRunner, which logs the last 100 episodes only and has no place for
+    what is done here after an iteration.
+    """
+    observed, rewards = env.get_observations(), []
+    with torch.inference_mode():
+        for _ in range(steps):
+            observed, reward, done, extras = env.step(ppo.act(observed))
+            ppo.process_env_step(observed, reward, done, extras)
+            rewards.append(float(reward.mean()))
+        ppo.compute_returns(observed)
+    ppo.update()
+    return float(np.mean(rewards))
+
+
+def _next_log_stds(params: PolicyParams) -> Sequence[float | None]:
+    """Log of the exploration after each iteration; None: left to PPO.
+
+    A scheduled exploration narrows geometrically from init_std to final_std: left to itself PPO
+    narrows it so slowly that the mean still wanders by centimetres of landing at the end.
+    """
+    if params.exploration != "scheduled":
+        return [None] * params.iterations
+    start, end = np.log([params.init_std, params.final_std])
+    schedule = np.linspace(start, end, params.iterations)
+    return [*schedule[1:], schedule[-1]]
 
 
 def earned(
@@ -165,88 +231,3 @@ def earned(
 def summary(error: float) -> str:
     """A mean error [m], NaN where every launch fails, as progress tells of it."""
     return "every launch fails" if np.isnan(error) else f"mean error {100 * error:.2f} cm"
-
-
-class _Training:
-    """Stands where rsl_rl has its logger: after every iteration it checks the policy, keeps the
-    best, and narrows the exploration.
-
-    rsl_rl's own mean reward covers the last 100 episodes only, and its log folder copies git diffs.
-    A scheduled exploration narrows geometrically from init_std to final_std: left to itself PPO
-    narrows it so slowly that the mean still wanders by centimetres of landing at the end.
-    """
-
-    writer = None
-    log_dir = None
-
-    def __init__(
-        self,
-        runner: OnPolicyRunner,
-        env: SlingshotEnv,
-        params: PolicyParams,
-        progress: Progress | None,
-        projectile: tuple[float, float] | None,
-    ) -> None:
-        self.env, self.progress = env, progress
-        self.log_std = None
-        if params.exploration == "scheduled":
-            start, end = np.log([params.init_std, params.final_std])
-            schedule = np.linspace(start, end, params.iterations)
-            last = schedule[-1]
-            self.log_std = np.append(schedule, last)  # of each iteration, and after the last
-        network = runner.alg.get_policy()
-        self.distribution: Any = network.distribution
-        sizes = network.mlp, env.targets, env.surface
-        self.policy = Policy(*sizes) if projectile is None else ProjectilePolicy(*sizes, projectile)
-        self.checked = np.linspace(*env.targets, CHECKED_TARGETS)
-        self.rewards: list[float] = []
-        self.rows: list[dict] = []
-        self.reasons: dict[str, int] = {}
-        self.best: dict = {}
-
-    def init_logging_writer(self) -> None:
-        """Nothing to open."""
-
-    def process_env_step(self, rewards: torch.Tensor, *_: torch.Tensor | dict | None) -> None:
-        self.rewards.append(float(rewards.mean()))
-
-    def log(self, it: int, learning_rate: float, action_std: torch.Tensor, **_: object) -> None:
-        reasons = self.env.take_failures()
-        for reason, count in reasons.items():
-            self.reasons[reason] = self.reasons.get(reason, 0) + count
-        worth, error, failed = self._check()
-        self.rows.append(
-            {
-                "iteration": it + 1,
-                "mean_reward": float(np.mean(self.rewards)),
-                "mean_error": error,
-                "failed_targets": failed,
-                "failures": sum(reasons.values()),
-                "learning_rate": float(learning_rate),
-                "std": float(action_std.detach().mean()),
-            }
-        )
-        self.rewards.clear()
-        if self.log_std is not None:
-            with torch.no_grad():
-                self.distribution.log_std_param.fill_(self.log_std[it + 1])
-        if not self.best or worth > self.best["earned"]:
-            weights = copy.deepcopy(self.policy.state_dict())
-            self.best = {"earned": worth, "row": it, "weights": weights}
-        if self.progress:
-            self.progress.advance(1, summary(error))
-
-    def _check(self) -> tuple[float, float, int]:
-        draws = self.policy.draws(self.checked)
-        return earned(self.env.surface, draws, self.checked, self.env.reward)
-
-    def result(self) -> Trained:
-        self.policy.load_state_dict(self.best["weights"])
-        row = self.rows[self.best["row"]]
-        return Trained(
-            policy=self.policy.eval(),
-            curve={name: [row[name] for row in self.rows] for name in self.rows[0]},
-            iteration=row["iteration"],
-            mean_error=row["mean_error"],
-            failures=dict(sorted(self.reasons.items())),
-        )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
@@ -125,8 +126,7 @@ def _lead(rows: np.ndarray, hand: CubicSpline, sling: ClampedBand, episode: Epis
 
 def blend(time: np.ndarray, episode: Episode) -> np.ndarray:
     """What share is left, at times (T,), of the way from the grasp to the hand's path."""
-    part = np.clip((time - episode.grasp_time) / GRASP_BLEND, 0, 1)
-    return 1 - part**3 * (10 - 15 * part + 6 * part**2)
+    return 1 - minimum_jerk((time - episode.grasp_time) / GRASP_BLEND)
 
 
 def interact(

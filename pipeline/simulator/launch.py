@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -45,6 +46,14 @@ class Launches:
     separation_y: np.ndarray
     separation_z: np.ndarray
     failure: list[str | None]
+
+    def __getitem__(self, chosen: np.ndarray) -> Launches:
+        """Launches by their numbers or a mask."""
+        columns: dict[str, Any] = {
+            field.name: np.array(getattr(self, field.name))[chosen] for field in fields(self)
+        }
+        columns["failure"] = columns["failure"].tolist()
+        return Launches(**columns)
 
 
 def ballistic_landing(y, z, vy, vz, floor: float):
@@ -119,14 +128,14 @@ def launch(
     )  # fmt: skip
     schedule = schedule_of(setup, refine)
 
-    def launched(place: str, share: np.ndarray) -> np.ndarray:
+    def launched_on(place: str, share: np.ndarray) -> np.ndarray:
         options = Options(place, workers, launching=True, double=double)
         return run(band, schedule, slings[share], options=options).lanes
 
     devices = [device] if isinstance(device, str) else device[: max(count // SHARE, 1)]
     shares = np.array_split(np.arange(count), len(devices))
     with ThreadPoolExecutor(len(devices)) as pool:
-        lanes = np.concatenate(list(pool.map(launched, devices, shares)))
+        lanes = np.concatenate(list(pool.map(launched_on, devices, shares)))
     return limited(outcomes(band, setup, parameters, lanes, draws), max_force)
 
 

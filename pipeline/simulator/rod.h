@@ -11,8 +11,9 @@
 // d s/2 times the first, bending form in the rates damps it: with the twist's part of it, neighbours that are turned
 // far from each other would gain energy.
 //
-// For solve.h and step.h: what one section adds to the Hessian and the residual (stage_section), as columns (column), and what
-// else depends on the element: which degrees of freedom are places (the first ones), their masses, and the hand's hold.
+// For solve.h and step.h: what one section adds to the Hessian and the residual (stage_section), column by column
+// (hessian_column), and what else depends on the element: which degrees of freedom are places (the first ones), their
+// masses, and the hand's hold.
 
 const int PLACES = 3;  // of the node; the others are directors
 auto share = [](int) -> SC { return 1; };             // of a place in the section's mass
@@ -189,9 +190,12 @@ auto stage_section = [&](int i) {
   UNROLL for (int m = 0; m < N; ++m) { PUT(FORCE + m) = f[m]; PUT(FORCE_NEXT + m) = f_next[m]; }
 };
 
-// column c of staged section j: D of its block, U of the transposed coupling with the next section (what its number c
-// feels of this section), and what is carried into the next section's block; c = N is the residual. A chain that comes
-// from the last section wants the coupling with the section before, and what that one carries into this block.
+// Column c of what staged section i has of the Hessian in solve.h: D of its A, without what the section before adds to
+// it; U of its B'; `carry` of what edge and joint between both add to the A of the chain's next section. c = N is the
+// residual: of this section in U, of the next one in `carry`.
+//
+// On a GPU the chain from the last section (`down`) goes on to section i - 1, with which edge and joint are staged: U is
+// of the B of that one, and `carry` is for section i itself.
 #if defined(__CUDA_ARCH__)
 // c is mine, so that where its numbers stand is found once
 const bool residual = mine >= N, node = mine < 3, director = !residual && !node;
@@ -205,7 +209,7 @@ UNROLL for (int m = 0; m < N; ++m) {
 }
 const int twist_at = director ? (down ? TWIST : TWIST_NEXT) + mine - 3 : NOTHING, carried_twist_at = director ? TWIST_NEXT + mine - 3 : NOTHING;
 const int other_twist = down ? TWIST_NEXT : TWIST;
-auto column = [&](int i, int, real* D, real* U, real* carry) {
+auto hessian_column = [&](int i, int, real* D, real* U, real* carry) {
   const int j = down ? i - 1 : i, k = residual ? i : j;
   const real twisting = -GET(TWISTING, j), coupled = twisting * GET(twist_at, j), carried = twisting * GET(carried_twist_at, j);
   const real bend = director ? GET(BEND, j) : zero, sign = residual ? one : -one;
@@ -217,18 +221,18 @@ auto column = [&](int i, int, real* D, real* U, real* carry) {
   }
 };
 #else
-auto column = [&](int j, int c, real* D, real* U, real* carry) {
+auto hessian_column = [&](int i, int c, real* D, real* U, real* carry) {
   const bool residual = c >= N, node = c < 3, director = !residual && !node;
-  const real bend = GET(BEND, j), twisting = -GET(TWISTING, j) * GET(TWIST_NEXT + (director ? c - 3 : 0), j);
-  UNROLL for (int m = FIRST_ROW(residual ? 0 : c); m < N; ++m) D[m] = GET(OWN + LOWER(m, residual ? 0 : c), j);
+  const real bend = GET(BEND, i), twisting = -GET(TWISTING, i) * GET(TWIST_NEXT + (director ? c - 3 : 0), i);
+  UNROLL for (int m = FIRST_ROW(residual ? 0 : c); m < N; ++m) D[m] = GET(OWN + LOWER(m, residual ? 0 : c), i);
   UNROLL for (int m = 0; m < 3; ++m) {
     const int stretch = STRETCH + LOWER(m, node ? c : 0);
-    const real here = GET(residual ? FORCE + m : stretch, j), there = GET(residual ? FORCE_NEXT + m : stretch, j);
+    const real here = GET(residual ? FORCE + m : stretch, i), there = GET(residual ? FORCE_NEXT + m : stretch, i);
     U[m] = residual ? here : node ? -here : zero;
     carry[m] = director ? zero : there;
   }
   UNROLL for (int m = 3; m < N; ++m) {
-    const real here = GET((residual ? FORCE : TWIST - 3) + m, j), there = GET((residual ? FORCE_NEXT : TWIST_NEXT - 3) + m, j);
+    const real here = GET((residual ? FORCE : TWIST - 3) + m, i), there = GET((residual ? FORCE_NEXT : TWIST_NEXT - 3) + m, i);
     const real diagonal = m == c ? bend : zero;
     U[m] = residual ? here : node ? -D[m] : twisting * here - diagonal;
     carry[m] = residual ? there : node ? zero : twisting * there + diagonal;

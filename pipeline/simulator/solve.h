@@ -1,9 +1,15 @@
-// Newton's system: the Hessian is block-tridiagonal, a block N x N a section. It is eliminated from the first section to
-// the last (D = L diag L' of each block; Schur complement into the next) and substituted back; by two chains, from both
-// ends to the middle, where what both leave is added.
+// Newton's system: the Hessian is block-tridiagonal, a block N x N a section,
 //
-// A thread has COLUMNS columns of a block: of D itself, of U, the transposed coupling with the next section, and of
-// `next`, what goes into the next section's block. Column N of U and `next` is the residual.
+//   | A0  B0'         | | x0 |   | f0 |
+//   | B0  A1  B1'     | | x1 |   | f1 |      eliminated:  D0 = A0,  D1 = A1 - B0 D0^-1 B0',  ...
+//   |     B1  A2  B2' | | x2 | = | f2 |      U0 = B0',  U1 = B1',  ...
+//   |         ..  ..  | | .. |   | .. |
+//
+// It is eliminated from the first section to the last (D = L diag L' of each block; Schur complement into the next) and
+// substituted back; by two chains, from both ends to the middle, where what both leave is added.
+//
+// A thread has COLUMNS columns of a block: of D, of U, and of `next`, what goes into the next section's D. Column N of U
+// and `next` is the residual f.
 
 real change = zero, imbalance = zero;         // longest entry of Newton's step [m]; largest residual [N]
 real indefinite = zero, poison = zero;        // whether a pivot is not positive; no number as soon as anything is
@@ -25,7 +31,7 @@ auto take = [&](int i, real (&D)[COLUMNS][N], real (&U)[COLUMNS][N], real (&next
   UNROLL for (int q = 0; q < COLUMNS; ++q) {
     const int c = q + mine;
     real carry[N];
-    column(i, c, D[q], U[q], carry);
+    hessian_column(i, c, D[q], U[q], carry);
     if (down) UNROLL for (int m = 0; m < N; ++m) { next[q][m] += met ? zero : carry[m]; carry[m] = zero; }
     if (c < N) { UNROLL for (int m = FIRST_ROW(c); m < N; ++m) D[q][m] += next[q][m]; }
     else { UNROLL for (int m = 0; m < N; ++m) U[q][m] += next[q][m]; }

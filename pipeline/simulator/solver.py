@@ -260,7 +260,7 @@ class _Work:
         """Step the slings of rows from `begin` to `end`; arrays (slings, width) of RETURNED."""
         import warp as wp
 
-        from pipeline.base.native import empty, launch
+        from pipeline.base.native import empty, run_kernel
 
         size, device = end - begin, self.options.device
         scalar = wp.dtype_from_numpy(self.dtype)
@@ -273,7 +273,7 @@ class _Work:
         given = self.arrays()
         for name, values in arrays.items():
             setattr(given, name, values)
-        launch(self.kernel, size, [given], device)
+        run_kernel(self.kernel, size, [given], device)
         return {name: self._fetched(name, arrays[name], size) for name in RETURNED}
 
     def _fetched(self, name: str, array, size: int):

@@ -122,8 +122,8 @@ auto stage_section = [&](int i) {
   }
 };
 
-// column c of the staged section, as rod.h's; c = N is the residual
-auto column = [&](int, int c, real* D, real* U, real* carry) {
+// as rod.h's
+auto hessian_column = [&](int, int c, real* D, real* U, real* carry) {
   if (c == N) {
     for (int m = 0; m < N; ++m) { U[m] = force_here[m]; carry[m] = force_there[m]; }
     return;

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.launch import launched
+from app.launch import launch_output
 from app.observe import prediction_of
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
@@ -61,7 +61,7 @@ def answers(path: Path, ask: Callable[[], dict]) -> int:
 def test_launch(params, layout, name) -> None:
     theta = layout.theta(BAND, METHOD)
     path = theta if name == "theta" else layout.clamps(BAND)
-    assert answers(path, lambda: launched(params, BAND, theta, DRAW, layout.root)) > 0
+    assert answers(path, lambda: launch_output(params, BAND, theta, DRAW, layout.root)) > 0
 
 
 def test_what_observe_says_before_and_after(params, layout) -> None:

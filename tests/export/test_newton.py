@@ -28,8 +28,8 @@ def done(model, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def chain(model, done) -> SpringChain:
-    draws = draws_of(model)
-    start = SpringChain.of(model, draws, model.launches(draws).hold_force)
+    draws, ours = draws_of(model)
+    start = SpringChain.of(model, draws, ours.hold_force)
     matched = {row["name"]: row["value"] for row in done.card["matched"]}
     return replace(start, step=done.card["time_step_s"], **matched)
 

@@ -55,5 +55,5 @@ def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorde
     simulated = own_law_episode(sling, rig, TRUTH, cutoff=cutoff, force_noise=noise)
     at_truth = evaluator(quick, sling, simulated)
     own_loss = at_truth(at_truth.box.unit_of(TRUTH)).total[0]  # its least is no more
-    best = evaluations_of(quick, METHOD, evaluator(quick, sling, rig)).best()
+    best = evaluations_of(quick, METHOD, evaluator(quick, sling, rig)).best_row()
     assert best["total"] > 3 * own_loss

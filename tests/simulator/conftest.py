@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.episode.episode import Episode
 from pipeline.simulator import ClampedBand, LaunchSetup
 from pipeline.simulator.model import TETRAHEDRA
@@ -40,8 +41,7 @@ def strong_grip(sling):
 def episode():
     """Three seconds: grasp at 0.2 s, lift and pull by 2 s, hold, release at 2.4 s."""
     time = 0.015 + 0.03 * np.arange(100)
-    part = np.clip((time - 0.3) / 1.6, 0, 1)
-    smooth = part**3 * (10 - 15 * part + 6 * part**2)
+    smooth = minimum_jerk((time - 0.3) / 1.6)
     position = np.outer(1 - smooth, [0.0, 0.0, -0.2]) + np.outer(smooth, [0.0, -0.4, 0.0])
     return Episode(
         band="test",

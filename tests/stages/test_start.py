@@ -16,7 +16,7 @@ from pipeline.base.layout import NotMade
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.objective.loss import TERMS
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.params import load
 from stages.start import remedy
 from tests.project import DEFAULTS, ROOT, alive, python, until
@@ -65,7 +65,7 @@ def test_a_history_that_failed_says_why(stage) -> None:
     unit = np.random.default_rng(1).random((30, 5))
     nothing = {term: np.full(30, np.nan) for term in TERMS}
     theta, reasons = space.to_physical(unit), ["the band slipped"] * 30
-    history = History("sling2sim2real", space.names)
+    history = Evaluations("sling2sim2real", space.names)
     history.add(
         Evaluation(unit, theta, nothing, np.full(30, np.inf), reasons), phase="de", generation=0
     )

@@ -24,7 +24,7 @@ from pipeline.identify.objective.cache import EvaluationCache
 from pipeline.identify.objective.evaluate import Evaluator, simulated
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.posterior.identify import fit_posterior
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.identify.search.loop import latin_hypercube
 from pipeline.identify.search.regions import regions_asked
 from pipeline.params import Params, expect_known
@@ -93,41 +93,41 @@ def time_search(
     sling: ClampedBand,
     episode: Episode,
     devices: Sequence[str],
-) -> tuple[dict, History]:
+) -> tuple[dict, Evaluations]:
     """One search from nothing, all its rollouts counted; and what it evaluated."""
     params = params.model_copy(update={"optimizer": optimizer})
     method_params = params.methods[method]
     sling = replace(sling, law=method_params.law)
 
-    def whole(evaluate) -> tuple[History, int]:
-        history = evaluations_of(params, method, evaluate)
+    def whole(evaluate) -> tuple[Evaluations, int]:
+        searched = evaluations_of(params, method, evaluate)
         if method_params.search != LEAST_SQUARES:
-            return history, len(history.total)
-        start = history.best_parameters(method_params.law)
+            return searched, len(searched.total)
+        start = searched.best_parameters(method_params.law)
         fit = fit_posterior(params, method, sling, [episode], start, workers=os.cpu_count())
-        return history, len(history.total) + fit.rollouts
+        return searched, len(searched.total) + fit.rollouts
 
     with tempfile.TemporaryDirectory() as folder:
         cache = EvaluationCache(
             evaluator(params, method, sling, episode, devices), Path(folder), "bench"
         )
         evaluate, before = Clocked(cache), busy()
-        (history, count), cpu, wall = timed(partial(whole, evaluate))
+        (searched, count), cpu, wall = timed(partial(whole, evaluate))
     row = {
         "regions": regions_asked(method_params, optimizer)
         if method_params.search == "multistart"
         else 0,
         "rollouts": count,
-        "failed": int(np.isinf(history.total).sum()),
+        "failed": int(np.isinf(searched.total).sum()),
         "seconds": wall,
         "cpu_seconds": cpu,
         "evaluation_s": evaluate.seconds,
         "optimizer_s": wall - evaluate.seconds,
         "rollouts_per_s": count / wall,
-        "best_loss": history.best()["total"],
+        "best_loss": searched.best_row()["total"],
         "others_share": others_share(before, cpu, wall),
     }
-    return row, history
+    return row, searched
 
 
 def _generation(

@@ -17,7 +17,7 @@ from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.objective.loss import TERMS
 from pipeline.identify.objective.session import load_episode
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.identify.search.loop import latin_hypercube
 from pipeline.params import Params, expect_known
 from pipeline.simulator.launch import Launches, launch
@@ -90,11 +90,11 @@ def scaling(
         return {"launches": count} | _compared(works, teams, _launched)
 
     def search() -> dict:
-        rows, histories = zip(
+        rows, searches = zip(
             *(time_search(params, method, optimizer, sling, episode, team) for team in teams),
             strict=True,
         )
-        numbers = [_searched(history) for history in histories]
+        numbers = [_searched(evaluations) for evaluations in searches]
         equal = [all(map(_same, number, numbers[0])) for number in numbers]
         return {"method": method, "budget": size, "one_device": rows[0]} | _row(
             teams, [row["seconds"] for row in rows], equal
@@ -146,8 +146,12 @@ def _evaluated(evaluation: Evaluation) -> list[np.ndarray]:
     return [evaluation.total, *evaluation.terms.values(), np.array(evaluation.failure, str)]
 
 
-def _searched(history: History) -> list[np.ndarray]:
-    return [history.unit, history.total, *(history.table[name].to_numpy() for name in TERMS)]
+def _searched(evaluations: Evaluations) -> list[np.ndarray]:
+    return [
+        evaluations.unit,
+        evaluations.total,
+        *(evaluations.table[name].to_numpy() for name in TERMS),
+    ]
 
 
 def _launched(launches: Launches) -> list[np.ndarray]:

@@ -21,6 +21,8 @@ from mcap_ros2._dynamic import serialize_dynamic
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
+from pipeline.base.minimum_jerk import minimum_jerk
+
 TYPES = {
     "wrench": "geometry_msgs/msg/WrenchStamped",
     "pose": "geometry_msgs/msg/PoseStamped",
@@ -74,10 +76,10 @@ class Truth:
     radius: float = RADIUS
 
     def hand(self, t: float) -> np.ndarray:
-        low, lift = -0.195, _ease((t - self.grasp - 0.1) / (self.lifted - self.grasp - 0.1))
-        pull = _ease((t - self.lifted) / (self.drawn - self.lifted))
+        low, lift = -0.195, minimum_jerk((t - self.grasp - 0.1) / (self.lifted - self.grasp - 0.1))
+        pull = minimum_jerk((t - self.lifted) / (self.drawn - self.lifted))
         away = 0.06 * max(0.0, t - self.release)
-        approach = 0.08 * (1 - _ease(t / max(self.grasp - 0.1, 0.05)))
+        approach = 0.08 * (1 - minimum_jerk(t / max(self.grasp - 0.1, 0.05)))
         return np.array([0.0, -self.draw * pull - away - approach, low * (1 - lift)])
 
     def holds(self, t: float) -> bool:
@@ -145,11 +147,6 @@ class RosWriter:
             self._channels[topic] = number, serialize_dynamic(name, text)[name]
         number, encode = self._channels[topic]
         self._writer.add_message(number, time, encode(message), time)
-
-
-def _ease(x: float) -> float:
-    x = min(max(x, 0.0), 1.0)
-    return x**3 * (10 - 15 * x + 6 * x * x)
 
 
 def write_bag(

@@ -68,7 +68,7 @@ class Chamfer:
         """Distances in both directions [m], as Warp's float32 (N * K * 2,) on that device."""
         import warp as wp
 
-        from pipeline.base.native import empty, launch
+        from pipeline.base.native import empty, run_kernel
 
         count, frames, nodes, _ = center_line.shape
         if frames != self.frames:
@@ -92,7 +92,7 @@ class Chamfer:
         arrays.line, arrays.frames = center_line.flatten(), frames
         arrays.radius, arrays.camera = self.radius, wp.vec3(*self.camera)
         arrays.errors = errors = empty(count * frames * 2, wp.float32, device)
-        launch(kernel, count * frames, [arrays], device)
+        run_kernel(kernel, count * frames, [arrays], device)
         return errors
 
     def _kernel(self, edges: int, lanes: int) -> tuple[wp.Kernel, type]:

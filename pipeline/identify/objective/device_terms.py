@@ -55,7 +55,7 @@ class DeviceTerms:
         """
         import warp as wp
 
-        from pipeline.base.native import empty, launch
+        from pipeline.base.native import empty, run_kernel
         from pipeline.identify.objective.kernel import terms_kernel
 
         line, force = rollouts.center_line, rollouts.force
@@ -70,7 +70,7 @@ class DeviceTerms:
         filtered = count * 3 * arrays.samples
         arrays.filtered = empty(filtered, wp.float64, device)
         arrays.terms = terms = empty(count * 3, wp.float64, device)
-        launch(kernel, count, [arrays], device)
+        run_kernel(kernel, count, [arrays], device)
         return terms.numpy().reshape(count, 3)
 
     def _on(self, device: str, matrix: csr_array) -> dict[str, wp.array]:

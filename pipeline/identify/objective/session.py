@@ -30,7 +30,7 @@ SOURCES = (  # the code that a term of the loss depends on
 
 
 class LoggingEvaluator:
-    """An evaluator that tells of each batch: its number as in the history, and the best so far."""
+    """An evaluator that tells of each batch: its number as evaluated, and the best so far."""
 
     def __init__(self, evaluate: Callable[[np.ndarray], Evaluation], progress: Progress) -> None:
         self.evaluate, self.progress = evaluate, progress

@@ -192,11 +192,7 @@ class Likelihood:
     """
 
     def __init__(
-        self,
-        episode: Episode,
-        sling: ClampedBand,
-        cutoff: float,
-        friction: float,
+        self, episode: Episode, sling: ClampedBand, cutoff: float, friction: float
     ) -> None:
         """`friction` is what the method fixes, of the pads."""
         self.episode, self.cutoff = episode, cutoff
@@ -208,10 +204,11 @@ class Likelihood:
         self._frames = _that_count(episode)
 
     def aligned(self, parameters: Parameters) -> Likelihood:
-        """Copy with the camera's clock where these parameters, one sample, show the recoil best.
+        """Set the camera's clock, in a copy, to where these parameters show the recoil best.
 
-        A fit that starts a picture away from there can end in another minimum: a picture from
-        before the release does not change with the camera's clock. Raises Failed.
+        `parameters` are one sample. Where no other clock shows it clearly better, the likelihood
+        itself is returned. A fit that starts a picture away can end in another minimum: a picture
+        from before the release does not change with the camera's clock. Raises Failed.
         """
         best = recoil_seen(self.episode, self.tolerances.camera, parameters, self.sling)
         if best is None:

@@ -5,10 +5,10 @@
             components across it: `depth` towards the camera, `side` the other one        [m]
 
 Which samples and pictures count is decided by time and by what the camera saw, before anything is
-simulated: the
-force from the grasp to just before the release; pictures of the held band in the last half second
-before it, and of the recoil as long as a picture shows the damping more than the mesh. Bins and
-directions are those of one reference rollout; a bin that shows too few points is none.
+simulated (Rule): the force from the grasp to just before the release; pictures of the held band in
+the last half second before it, and of the recoil's first 34 ms, or for want of one the first until
+50 ms. Bins and directions are those of one reference rollout; a bin that shows too few points is
+none.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Search for parameters: the loop, its history, regions and optimisers."""
+"""Search for parameters: the loop, what it evaluated, regions and optimisers."""

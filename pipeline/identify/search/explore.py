@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.search.build import explorer
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.identify.search.loop import search
 from pipeline.params import Params
 from pipeline.params.identification import LEAST_SQUARES
@@ -27,7 +27,9 @@ def rollouts_of(params: Params, method: str) -> int:
     return count + optimizer.cma_rollouts
 
 
-def explore(params: Params, method: str, evaluate: Callable[[np.ndarray], Evaluation]) -> History:
+def explore(
+    params: Params, method: str, evaluate: Callable[[np.ndarray], Evaluation]
+) -> Evaluations:
     """Everything that the exploration of a method evaluates, in order.
 
     Args:
@@ -39,6 +41,6 @@ def explore(params: Params, method: str, evaluate: Callable[[np.ndarray], Evalua
     method_params, box = params.methods[method], SearchBox.of_method(params, method)
     rollouts = rollouts_of(params, method)
     optimizer = explorer(method_params, params.optimizer, len(box.free), rollouts)
-    history = History(method, box.names)
-    search(optimizer, evaluate, history, rollouts=rollouts, box=box)
-    return history
+    evaluations = Evaluations(method, box.names)
+    search(optimizer, evaluate, evaluations, rollouts=rollouts, box=box)
+    return evaluations

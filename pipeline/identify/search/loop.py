@@ -15,14 +15,14 @@ import numpy as np
 from pipeline.base.errors import UserError
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluation, Penalty
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 
 
 class Optimizer(Protocol):
     """Proposes points of the unit cube and learns their losses; deterministic given its seed.
 
     Attributes:
-        phase: How its rows are called in the history: de, cma, bo, adam, ...
+        phase: How its rows are called among the evaluations: de, cma, bo, adam, ...
         owner: May be left out; which of several solvers asked for each point, shape (N,).
     """
 
@@ -52,24 +52,24 @@ def latin_hypercube(dimension: int, count: int, seed: int) -> np.ndarray:
 def search(
     optimizer: Optimizer,
     evaluate: Callable[[np.ndarray], Evaluation],
-    history: History,
+    evaluations: Evaluations,
     *,
     rollouts: int,
     box: SearchBox | None = None,
 ) -> None:
-    """Run `optimizer` until exactly `rollouts` points are evaluated; all rows go to `history`.
+    """Run `optimizer` until exactly `rollouts` points are evaluated; all rows go to `evaluations`.
 
     The last batch is cut to what is left, and the optimiser does not see a cut batch. A failed
     point gets twice the worst finite loss so far.
 
     Args:
         evaluate: Losses of points of the whole unit cube, shape (N, D).
-        box: Whose free axes the optimiser knows; None: all of the history's.
+        box: Whose free axes the optimiser knows; None: all of them.
 
     Raises:
         UserError: The optimiser asked for something else than points of the unit cube.
     """
-    dimension = len(history.names if box is None else box.free)
+    dimension = len(evaluations.names if box is None else box.free)
     penalty = Penalty()
     generation = 0
     while rollouts > 0:
@@ -78,7 +78,7 @@ def search(
         unit = requested[:rollouts]
         rollouts -= len(unit)
         evaluation = evaluate(unit if box is None else box.fill(unit))
-        history.add(
+        evaluations.add(
             evaluation,
             phase=optimizer.phase,
             generation=generation,

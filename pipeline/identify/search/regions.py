@@ -1,4 +1,4 @@
-"""Promising regions of a history: centres by non-maximum suppression, covariances of neighbours.
+"""Promising regions of a search: centres by non-maximum suppression, covariances of neighbours.
 
 Distances are those of the unit cube; failed rows count for nothing.
 """
@@ -28,7 +28,7 @@ class Region:
         mu: Centre in the unit cube, shape (D,).
         sigma: Positive definite covariance, shape (D, D).
         loss: Of the centre.
-        members: Rows of the history that the covariance is of, nearest first; the centre is one.
+        members: Evaluated rows that the covariance is of, nearest first; the centre is one.
     """
 
     mu: np.ndarray
@@ -43,24 +43,28 @@ def regions_asked(method_params: MethodParams, optimizer: OptimizerParams) -> in
 
 
 def regions_of(
-    method_params: MethodParams, optimizer: OptimizerParams, history
+    method_params: MethodParams, optimizer: OptimizerParams, evaluations
 ) -> tuple[list[Region], int]:
     """Where a method's refinement begins, and how many regions were asked for.
 
     Args:
-        about: params.yaml's `methods.<name>`.
+        method_params: params.yaml's `methods.<name>`.
         optimizer: params.yaml's `optimizer`.
-        history: The `History` of what its exploration evaluated, on its free axes.
+        evaluations: The `Evaluations` of its exploration, on its free axes.
 
     Raises:
         UserError: As `find_regions`.
     """
-    settings = {name: getattr(optimizer, name) for name in ("k_nn", "delta")}
-    settings |= {
-        "k_top": regions_asked(method_params, optimizer),
-        "covariance": method_params.covariance,
-    }
-    return find_regions(history.unit, history.total, **settings), settings["k_top"]
+    count = regions_asked(method_params, optimizer)
+    regions = find_regions(
+        evaluations.unit,
+        evaluations.total,
+        k_top=count,
+        k_nn=optimizer.k_nn,
+        delta=optimizer.delta,
+        covariance=method_params.covariance,
+    )
+    return regions, count
 
 
 def find_regions(

@@ -22,7 +22,7 @@ from pipeline.base.files import read_table, replacing
 from pipeline.launching.surface.response_surface import NO_FAILURE, Landings, ResponseSurface
 
 
-class Launched(Protocol):
+class SimulatedLaunches(Protocol):
     """N simulated launches."""
 
     @property
@@ -41,7 +41,7 @@ class Launched(Protocol):
         ...
 
 
-Launcher = Callable[..., Launched]  # of draws (N, 2) [m], without a force limit of its own
+Launcher = Callable[..., SimulatedLaunches]  # of draws (N, 2) [m], without a force limit of its own
 
 
 @dataclass(frozen=True)

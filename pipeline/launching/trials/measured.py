@@ -6,7 +6,6 @@ The stage `evidence` checks them, and whatever predicts them reads what it write
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -18,8 +17,7 @@ from pipeline.base.target import TARGET_AREA
 from pipeline.params import Params
 
 
-@dataclass(frozen=True)
-class Measured:
+class Measured(JsonRecord):
     """One launch that a user measured.
 
     Attributes:
@@ -29,7 +27,7 @@ class Measured:
         method: Whose policy; "" of a launch that nobody aimed, which every method predicts.
     """
 
-    draw: tuple[float, float]
+    draw: Annotated[tuple[float, float], LIST]
     landing: float | None
     target: float | None
     method: str = ""
@@ -72,30 +70,19 @@ def read_measured(path: Path, methods: Collection[str]) -> list[Measured]:
                 f"{where}: target_m {target} lies outside the target on the floor,"
                 f" {list(TARGET_AREA)}, where every landing counts as failed"
             )
-        launches.append(Measured(row.draw, row.landing, target, method))
+        launches.append(Measured(draw=row.draw, landing=row.landing, target=target, method=method))
     return launches
 
 
-class MeasuredRecord(JsonRecord):
-    draw: Annotated[tuple[float, float], LIST]
-    landing: float | None
-    target: float | None
-    method: str
-
-
 class ScoresFile(JsonRecord):
-    launches: list[MeasuredRecord]
+    launches: list[Measured]
 
 
 def save_scores(path: Path, launches: Sequence[Measured]) -> None:
     """Write a `ScoresFile`."""
-    write_json(path, {"launches": [vars(launch) for launch in launches]})
+    write_json(path, {"launches": [launch.model_dump() for launch in launches]})
 
 
 def load_scores(path: Path) -> list[Measured]:
     """The launches of a `ScoresFile`. Raises NotMade."""
-    read = read_json(path, ScoresFile)
-    return [
-        Measured(launch.draw, launch.landing, launch.target, launch.method)
-        for launch in read.launches
-    ]
+    return read_json(path, ScoresFile).launches

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from pipeline.launching.surface.landing_map import Launched, Launcher
+from pipeline.launching.surface.landing_map import Launcher, SimulatedLaunches
 from pipeline.simulator.launch import landing_gradient
 from pipeline.simulator.parameters import Parameters
 
@@ -84,19 +84,19 @@ def smoothed(values: np.ndarray) -> tuple[np.ndarray, float]:
     return values.mean() + (values - values.mean()) * np.sqrt(1 - share**2), share * values.std()
 
 
-def shortest(values: np.ndarray, level: float = LEVEL) -> np.ndarray:
-    """The shortest interval that holds a share `level` of equally likely values (N,), shape (2,).
+def shortest(values: np.ndarray) -> np.ndarray:
+    """The shortest interval that holds a share LEVEL of equally likely values (N,), shape (2,).
 
     It is the region of highest density (Hyndman 1996, 10.1080/00031305.1996.10474359). A central
     interval would leave out the likeliest landings where a parameter lies at the end of its range,
     as that of a rubber which does not soften.
     """
     values = np.sort(values)
-    inside = int(np.ceil(level * len(values))) - 1
+    inside = int(np.ceil(LEVEL * len(values))) - 1
     first = int(np.argmin(values[inside:] - values[: len(values) - inside]))
     return values[[first, first + inside]]
 
 
-def _landing(launched: Launched) -> np.ndarray:
+def _landing(launched: SimulatedLaunches) -> np.ndarray:
     good = np.array([failure is None for failure in launched.failure])
     return np.where(good, np.asarray(launched.landing_y, float), np.nan)

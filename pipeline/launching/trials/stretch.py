@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from pipeline.episode.episode import Episode
+from pipeline.episode.pull import held_positions
 
 
 def stretch_of(points: np.ndarray, fork_width: float, rest_length: float) -> np.ndarray:
@@ -21,10 +22,4 @@ def stretch_of(points: np.ndarray, fork_width: float, rest_length: float) -> np.
 
 def recorded_stretch(episodes: Iterable[Episode], fork_width: float, rest_length: float) -> float:
     """The largest stretch that the recordings show."""
-    held = [
-        episode.position[
-            (episode.time >= episode.grasp_time) & (episode.time <= episode.release_time)
-        ]
-        for episode in episodes
-    ]
-    return float(stretch_of(np.concatenate(held), fork_width, rest_length).max())
+    return float(stretch_of(held_positions(episodes), fork_width, rest_length).max())

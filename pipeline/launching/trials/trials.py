@@ -134,8 +134,8 @@ def aimed(stored: Stored, targets: list[float]) -> Batch:
     return Batch("predicted", stored.draws(np.array(targets)), list(targets))
 
 
-def launched(batch: Batch, launch: Callable) -> Batch:
-    """The same in a virtual world; launches of equal number have equal errors.
+def launch_virtually(batch: Batch, launch: Callable) -> Batch:
+    """Launch a batch in a virtual world; launches of equal number have equal errors.
 
     Args:
         launch: `launch(draw, number)` gives landing_y [m], NaN where there is none, failure,

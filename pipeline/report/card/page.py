@@ -38,7 +38,7 @@ def write_page(
     """Write index.html into `folder`, where the text's pictures lie. Raises UserError.
 
     Args:
-        launches: As `launched` has them.
+        launches: As `flights_at` has them.
     """
     shown = content(episode, simulated, setup) | {"launches": launches}
     data = json.dumps(shown, separators=(",", ":"))
@@ -87,7 +87,7 @@ def content(episode: Episode, simulated: Simulated, setup: SetupParams) -> dict:
     }
 
 
-def launched(trials: pd.DataFrame, aims: Aims) -> list[dict]:
+def flights_at(trials: pd.DataFrame, aims: Aims) -> list[dict]:
     """Launches by target, for replay.js; places (y, z) in whole millimetres, frame O.
 
     A measured launch has no flight, and one that failed before it flew has no landing either.

@@ -278,8 +278,7 @@ def _launches(findings: Findings):
 def _tried(findings: Findings):
     if not (findings.scores or findings.observed):
         yield Reason(
-            False,
-            f"No launch was measured{'.' if findings.unloaded else f', and {UNSEEN}'}",
+            False, f"No launch was measured{'.' if findings.unloaded else f', and {UNSEEN}'}"
         )
     if findings.scores:
         unlucky = binom.sf(findings.outside - 1, findings.scores, 1 - LEVEL) < UNLUCKY

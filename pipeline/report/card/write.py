@@ -17,7 +17,7 @@ from pipeline.report.card.camera import Pictures
 from pipeline.report.card.findings import findings
 from pipeline.report.card.inputs import CardInputs, card_inputs
 from pipeline.report.card.next_steps import next_steps
-from pipeline.report.card.page import launched, write_page
+from pipeline.report.card.page import flights_at, write_page
 from pipeline.report.card.simulated import simulate
 from pipeline.report.card.text import card_text, reasons_of
 from pipeline.report.card.values import boxes, values
@@ -58,7 +58,7 @@ def write(params: Params, band: str, method: str, root: str | Path = ".") -> dic
         write_text(folder / "README.md", card_text(*text))
         write_json(folder / "card.json", card)
         page = card_text(*text, animated=False)
-        launches = launched(inputs.trials, aims)
+        launches = flights_at(inputs.trials, aims)
         write_page(folder, page, f"{band}: {verdict}", episode, simulated, setup, launches)
     return card
 

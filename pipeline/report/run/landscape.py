@@ -47,7 +47,7 @@ def landscape(params: Params, result: Result, episode: Episode) -> Landscape:
 
 
 def _span(result: Result, name: str) -> np.ndarray:
-    refined = result.history.loc[result.history.phase == "cma", f"unit_{name}"]
+    refined = result.evaluations.loc[result.evaluations.phase == "cma", f"unit_{name}"]
     axis = result.axes.index(name)
     centres = [region.mu[axis] for region in result.regions]
     low, high = np.quantile(refined, [0.02, 0.98])

@@ -42,7 +42,7 @@ class Result:
 
     Attributes:
         theta: The θ file: "theta", "loss", "rollouts", "confidence", ...
-        history: Every evaluated θ, the exploration's rows before the refinement's.
+        evaluations: Every evaluated θ, the exploration's rows before the refinement's.
         regions: Where the refinement began; none for a search of one phase.
         axes: Names of the regions' axes in the unit cube.
         card: The policy's card.
@@ -54,7 +54,7 @@ class Result:
     band: str
     method: str
     theta: dict
-    history: pd.DataFrame
+    evaluations: pd.DataFrame
     regions: list[Region]
     axes: list[str]
     card: dict
@@ -138,11 +138,11 @@ def _unused(layout: Layout, band: str, methods: Collection[str]) -> int:
 
 
 def _result(params: Params, layout: Layout, band: str, method: str) -> Result:
-    history = pd.read_parquet(made(layout.evaluations(band, method)))
+    evaluations = pd.read_parquet(made(layout.evaluations(band, method)))
     clusters = layout.clusters(band, method)
     clustered = params.methods[method].search == "multistart"
     regions, axes = load_regions(clusters) if clustered else ([], [])
-    if missing := [name for name in axes if f"unit_{name}" not in history]:
+    if missing := [name for name in axes if f"unit_{name}" not in evaluations]:
         raise NotMade(clusters, f"names: {missing[0]} was not searched")
     theta = load_theta(layout.theta(band, method), band)
     stored, policy = Stored(band, method, layout.root), layout.policy(band, method)
@@ -150,7 +150,7 @@ def _result(params: Params, layout: Layout, band: str, method: str) -> Result:
         band=band,
         method=method,
         theta=theta,
-        history=history,
+        evaluations=evaluations,
         regions=regions,
         axes=axes,
         card=stored.card(),
@@ -165,15 +165,15 @@ def load_floor(path: Path) -> dict:
     return read_json(path, Floor).model_dump()
 
 
-def printed(history: pd.DataFrame) -> np.ndarray:
+def printed(evaluations: pd.DataFrame) -> np.ndarray:
     """The paper's printed loss of every row, shape (N,), whatever the method minimised."""
-    total = history[list(PRINTED)].sum(axis=1, skipna=False).to_numpy(float)
+    total = evaluations[list(PRINTED)].sum(axis=1, skipna=False).to_numpy(float)
     return np.where(np.isfinite(total), total, np.inf)
 
 
-def best_so_far(history: pd.DataFrame) -> np.ndarray:
+def best_so_far(evaluations: pd.DataFrame) -> np.ndarray:
     """Row of the least total of the method's own loss among the rows so far, shape (N,)."""
-    total = history.total.to_numpy(float)
+    total = evaluations.total.to_numpy(float)
     total = np.where(np.isfinite(total), total, np.inf)
     better = np.append(True, total[1:] < np.minimum.accumulate(total)[:-1])
     return np.maximum.accumulate(np.where(better, np.arange(len(total)), 0))

@@ -120,8 +120,8 @@ def place(copies, monkeypatch) -> Iterator[Callable[[Path], cluster.Cluster]]:
             return made[-1]
 
         yield make
-        for cluster_i in made:
-            cluster_i.__exit__()
+        for opened in made:
+            opened.__exit__()
 
 
 def run(place: cluster.Cluster, name: str, **options) -> tuple[bool, list[str]]:

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.episode.episode import Episode
 from pipeline.params import load
 from pipeline.simulator.model import ClampedBand, ClampValues
@@ -21,8 +22,7 @@ def sling_of(mass: float, clamps: ClampValues | None = None) -> ClampedBand:
 
 def smooth(time: np.ndarray, start: float, end: float) -> np.ndarray:
     """From 0 to 1 with rest at both ends."""
-    part = np.clip((time - start) / (end - start), 0, 1)
-    return part**3 * (10 - 15 * part + 6 * part**2)
+    return minimum_jerk((time - start) / (end - start))
 
 
 def pulled(

@@ -73,10 +73,10 @@ def test_it_finds_a_minimum_beside_a_wall_of_failures() -> None:
     """The minimum lies 0.002 from the wall: less than a difference."""
     evaluate = quadratic(CENTRE, MATRIX, fails=lambda unit: unit[:, 3] > CENTRE[3] + 0.002)
     for seed in (1, 2, 3):
-        history = alone("adam", evaluate, 600, changed(seed=seed, population=20))
-        assert np.isinf(history.total[20:]).any() and np.isfinite(history.unit).all()
-        assert history.total.min() - 1 < 0.1
-        assert history.total[:20].min() - 1 > 0.3
+        evaluations = alone("adam", evaluate, 600, changed(seed=seed, population=20))
+        assert np.isinf(evaluations.total[20:]).any() and np.isfinite(evaluations.unit).all()
+        assert evaluations.total.min() - 1 < 0.1
+        assert evaluations.total[:20].min() - 1 > 0.3
 
 
 def test_a_start_that_fails_goes_back() -> None:
@@ -93,12 +93,14 @@ def test_a_start_that_fails_goes_back() -> None:
 
 def test_a_corner_is_reached() -> None:
     """The minimum outside the cube: clamped at its faces, no difference leaves it."""
-    history = alone("adam", quadratic(np.full(D, 1.2), np.eye(D)), 600, changed(population=6))
-    np.testing.assert_allclose(history.unit[np.argmin(history.total)], 1, atol=0.01)
-    assert history.unit.max() <= 1
+    evaluations = alone("adam", quadratic(np.full(D, 1.2), np.eye(D)), 600, changed(population=6))
+    np.testing.assert_allclose(evaluations.unit[np.argmin(evaluations.total)], 1, atol=0.01)
+    assert evaluations.unit.max() <= 1
 
 
 def test_the_budget_is_spent_and_losses_alike_move_nothing() -> None:
-    history = alone("adam", Evaluate(lambda unit: np.ones(len(unit))), 100, changed(population=20))
-    assert len(history.total) == 100
-    assert len(np.unique(history.unit[20:], axis=0)) == 3 * (D + 1)
+    evaluations = alone(
+        "adam", Evaluate(lambda unit: np.ones(len(unit))), 100, changed(population=20)
+    )
+    assert len(evaluations.total) == 100
+    assert len(np.unique(evaluations.unit[20:], axis=0)) == 3 * (D + 1)

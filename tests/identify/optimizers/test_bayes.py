@@ -50,21 +50,21 @@ def random_points(count: int, dimension: int, seed: int) -> np.ndarray:
 def test_it_beats_random_points(function, names, rollouts: int, least: float, near: float) -> None:
     """By bounds that it keeps with any seed: another CPU's rounding is like another seed."""
     optimizer = changed(seed=2, population=POPULATION)
-    history = alone("bo", Evaluate(function, names), rollouts, optimizer, names)
-    assert len(history.total) == rollouts
-    assert least <= history.total.min() < least + near
+    evaluations = alone("bo", Evaluate(function, names), rollouts, optimizer, names)
+    assert len(evaluations.total) == rollouts
+    assert least <= evaluations.total.min() < least + near
     for other in range(10):
-        assert history.total.min() < function(random_points(rollouts, len(names), other)).min()
+        assert evaluations.total.min() < function(random_points(rollouts, len(names), other)).min()
 
 
 def test_it_goes_round_a_part_that_fails() -> None:
     """A valley of two pairs that trade off, beside failures that fill more than half of the box."""
     evaluate = quadratic(CENTRE, correlated(), fails=lambda unit: unit[:, 3] < 0.6)
     random = [evaluate(random_points(120, 5, other)).total.min() for other in range(10)]
-    history = alone("bo", evaluate, 120, changed(population=20))
-    assert np.isinf(history.total[:20]).any()
-    assert np.isinf(history.total[-60:]).mean() < 0.1
-    assert history.total.min() - 1 < (np.median(random) - 1) / 3
+    evaluations = alone("bo", evaluate, 120, changed(population=20))
+    assert np.isinf(evaluations.total[:20]).any()
+    assert np.isinf(evaluations.total[-60:]).mean() < 0.1
+    assert evaluations.total.min() - 1 < (np.median(random) - 1) / 3
 
 
 def test_it_is_silent_and_torch_waits_until_it_is_asked_for() -> None:
@@ -76,8 +76,8 @@ from tests.identify.search.functions import NAMES, Evaluate, alone, changed
 
 assert not {"torch", "botorch"} & set(sys.modules)
 for function in (lambda unit: np.ones(len(unit)), lambda unit: (unit[:, 0] - 0.3) ** 2):
-    history = alone("bo", Evaluate(function, NAMES[:1]), 30, changed(population=10), NAMES[:1])
-    print(len(np.unique(history.unit, axis=0)))
+    evaluations = alone("bo", Evaluate(function, NAMES[:1]), 30, changed(population=10), NAMES[:1])
+    print(len(np.unique(evaluations.unit, axis=0)))
 """
     done = python("-c", code)
     assert (done.returncode, done.stderr) == (0, "")

@@ -44,8 +44,8 @@ def test_the_explorer_moves_as_params_say() -> None:
 
 
 def test_a_class_of_ones_own_gets_its_settings() -> None:
-    history = alone(OWN, Evaluate(rosenbrock), 20)
-    assert set(history.table["phase"].to_pylist()) == {"random"}
+    evaluations = alone(OWN, Evaluate(rosenbrock), 20)
+    assert set(evaluations.table["phase"].to_pylist()) == {"random"}
     assert explorer(*method(search=OWN, settings={"batch": 3}), 4, 60).ask().shape == (3, 4)
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import differential_evolution
 
 from pipeline.identify.optimizers.de.evolution import Evolution
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.identify.search.loop import latin_hypercube, search
 from tests.identify.search.functions import NAMES, rosenbrock
 
@@ -97,7 +97,7 @@ def test_a_failing_evaluation_surfaces_and_leaves_no_thread(error: type[BaseExce
         raise error
 
     with pytest.raises(error):
-        search(small(), broken, History("toy", NAMES[:2]), rollouts=15)
+        search(small(), broken, Evaluations("toy", NAMES[:2]), rollouts=15)
     assert not left()
 
 

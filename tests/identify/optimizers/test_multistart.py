@@ -5,7 +5,7 @@ import os
 import numpy as np
 
 from pipeline.identify.optimizers.cma.multistart import Multistart, Solver
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.identify.search.loop import search
 from pipeline.identify.search.regions import Region
 from tests.identify.search.functions import CENTRE, Evaluate, correlated, quadratic, rosenbrock
@@ -45,10 +45,14 @@ def test_all_solvers_ask_as_one_batch_and_learn_their_own_losses() -> None:
             solver.tell(rosenbrock(part))
 
 
-def searched(regions: list[Region], evaluate: Evaluate, rollouts: int, population: int) -> History:
-    history = History("toy", evaluate.box.names)
-    search(Multistart(regions, population=population, seed=1), evaluate, history, rollouts=rollouts)
-    return history
+def searched(
+    regions: list[Region], evaluate: Evaluate, rollouts: int, population: int
+) -> Evaluations:
+    evaluations = Evaluations("toy", evaluate.box.names)
+    search(
+        Multistart(regions, population=population, seed=1), evaluate, evaluations, rollouts=rollouts
+    )
+    return evaluations
 
 
 def test_the_budget_is_spent_whatever_the_number_of_solvers() -> None:

@@ -10,7 +10,7 @@ from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.objective.loss import TERMS
 from pipeline.identify.optimizers.cma.multistart import Multistart
 from pipeline.identify.search.build import build
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.identify.search.loop import search
 from pipeline.identify.search.regions import Region, find_regions
 
@@ -87,22 +87,24 @@ def correlated() -> np.ndarray:
     return matrix
 
 
-def chain(evaluate, optimizer=BUDGET, names=NAMES) -> tuple[History, History, list[Region]]:
+def chain(evaluate, optimizer=BUDGET, names=NAMES) -> tuple[Evaluations, Evaluations, list[Region]]:
     """Explore, find regions, refine: both histories and the regions."""
     first, second = optimizer.population * (optimizer.generations + 1), optimizer.cma_rollouts
     explored = alone("de", evaluate, first, optimizer, names)
     sizes = {name: getattr(optimizer, name) for name in ("k_top", "k_nn", "delta")}
     regions = find_regions(explored.unit, explored.total, **sizes)
-    refined = History("toy", explored.names)
+    refined = Evaluations("toy", explored.names)
     several = Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed)
     search(several, evaluate, refined, rollouts=second)
     return explored, refined, regions
 
 
-def alone(name: str, evaluate, rollouts: int, optimizer=BUDGET, names=NAMES, **settings) -> History:
-    """The history of a search of one phase by the optimiser of that name."""
-    history = History("toy", names)
+def alone(
+    name: str, evaluate, rollouts: int, optimizer=BUDGET, names=NAMES, **settings
+) -> Evaluations:
+    """The evaluations of a search of one phase by the optimiser of that name."""
+    evaluations = Evaluations("toy", names)
     settings |= {"seed": optimizer.seed, "population": optimizer.population}
-    algorithm = build(name, len(history.names), rollouts=rollouts, **settings)
-    search(algorithm, evaluate, history, rollouts=rollouts)
-    return history
+    algorithm = build(name, len(evaluations.names), rollouts=rollouts, **settings)
+    search(algorithm, evaluate, evaluations, rollouts=rollouts)
+    return evaluations

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.identify.objective.cache import EvaluationCache
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from tests.identify.search.functions import CENTRE, Evaluate, alone, chain, correlated, quadratic
 
 ROLLOUTS = 150
 VALLEY = quadratic(CENTRE, correlated()).function
 
 
-def searched(name: str, evaluate) -> list[History]:
+def searched(name: str, evaluate) -> list[Evaluations]:
     """All histories of a search by that name."""
     if name == "multistart":
         return list(chain(evaluate)[:2])
@@ -34,8 +34,10 @@ def main() -> None:
         return VALLEY(unit)
 
     evaluate = Evaluate(dies)
-    for number, history in enumerate(searched(name, EvaluationCache(evaluate, folder, "inputs"))):
-        history.save(output / f"{number}.parquet")
+    for number, evaluations in enumerate(
+        searched(name, EvaluationCache(evaluate, folder, "inputs"))
+    ):
+        evaluations.save(output / f"{number}.parquet")
     print(evaluate.count)
 
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from pipeline.base.errors import UserError
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.search.build import build
+from pipeline.identify.search.evaluations import Evaluations, theta_content
 from pipeline.identify.search.explore import rollouts_of
-from pipeline.identify.search.history import History, theta_content
 from pipeline.identify.search.loop import latin_hypercube, search
 from pipeline.params import load
 from tests.identify.search import functions
@@ -37,8 +37,8 @@ def test_the_minimum_of_a_correlated_quadratic_is_found() -> None:
         explored, refined, _ = chain(evaluate, changed(seed=seed, cma_rollouts=1600))
         assert (len(explored.total), len(refined.total)) == (24 * 13, 1600)
         assert np.isinf(explored.total).any()
-        best = refined.best()
-        assert best["total"] - 1 < 1e-3 < explored.best()["total"] - 1
+        best = refined.best_row()
+        assert best["total"] - 1 < 1e-3 < explored.best_row()["total"] - 1
         np.testing.assert_allclose([best[f"unit_{n}"] for n in NAMES], CENTRE, atol=0.02)
 
 
@@ -60,10 +60,10 @@ def test_a_box_that_fails_everywhere_is_searched_to_the_end() -> None:
     """An optimiser is told finite losses even so; only then the failure is said."""
     evaluate = quadratic(CENTRE, np.eye(5), fails=lambda unit: unit[:, 0] >= 0)
     for name in ("de", "tests.identify.search.own:RandomSearch"):  # which looks at what it is told
-        history = alone(name, evaluate, 312)
-        assert np.isinf(history.total).all()
+        evaluations = alone(name, evaluate, 312)
+        assert np.isinf(evaluations.total).all()
         with pytest.raises(UserError, match="each of 312 simulations failed"):
-            history.best()
+            evaluations.best_row()
 
 
 class Recorder:
@@ -85,20 +85,20 @@ class Recorder:
 def test_exactly_the_budget_is_spent(sizes: list[int], data: st.DataObject) -> None:
     """Whatever sizes are asked for; the batch that is cut is not told."""
     rollouts = data.draw(st.integers(1, sum(sizes)))
-    recorder, history = Recorder(*sizes), History("toy", NAMES)
-    search(recorder, quadratic(CENTRE, np.eye(5)), history, rollouts=rollouts)
-    assert len(history.total) == rollouts
+    recorder, evaluations = Recorder(*sizes), Evaluations("toy", NAMES)
+    search(recorder, quadratic(CENTRE, np.eye(5)), evaluations, rollouts=rollouts)
+    assert len(evaluations.total) == rollouts
     whole = [size for size, end in zip(sizes, np.cumsum(sizes), strict=True) if end <= rollouts]
     assert [len(losses) for losses in recorder.summary] == whole
     generation = np.repeat(np.arange(len(sizes)), sizes)[:rollouts]
-    assert history.table["generation"].to_pylist() == generation.tolist()
+    assert evaluations.table["generation"].to_pylist() == generation.tolist()
 
 
 def test_failed_points_are_told_as_twice_the_worst_so_far() -> None:
     values = iter([np.array([1.0, np.inf, 3.0]), np.array([2.0, np.inf]), np.array([4.0, np.inf])])
     evaluate = Evaluate(lambda unit: next(values), fails=lambda unit: np.arange(len(unit)) == 1)
     recorder = Recorder(3, 2, 2)
-    search(recorder, evaluate, History("toy", NAMES), rollouts=7)
+    search(recorder, evaluate, Evaluations("toy", NAMES), rollouts=7)
     assert [losses.tolist() for losses in recorder.summary] == [
         [1.0, 6.0, 3.0],
         [2.0, 6.0],
@@ -107,28 +107,28 @@ def test_failed_points_are_told_as_twice_the_worst_so_far() -> None:
 
 
 def test_fixed_axes_keep_their_physical_values() -> None:
-    """The optimiser searches the other axes; the history has all of them."""
+    """The optimiser searches the other axes; the evaluations have all of them."""
     parameters = load(DEFAULTS).parameters
     fixed = {"poissons_ratio": 0.45, "elasticity_damping": 5e-3}
     box = SearchBox.of(parameters, fixed=fixed)
     assert box.free == ("youngs_modulus", "dynamic_friction", "damping_scale")
     evaluate = quadratic(CENTRE, np.eye(5))
     evaluate.box = box
-    history = History("toy", box.names)
+    evaluations = Evaluations("toy", box.names)
     optimizer = build("de", 3, rollouts=600, seed=1, population=20)
-    search(optimizer, evaluate, history, rollouts=600, box=box)
-    np.testing.assert_allclose(history.table["poissons_ratio"], 0.45, rtol=1e-12)
-    np.testing.assert_allclose(history.table["elasticity_damping"], 5e-3, rtol=1e-12)
-    best = [history.best()[f"unit_{name}"] for name in box.free]
+    search(optimizer, evaluate, evaluations, rollouts=600, box=box)
+    np.testing.assert_allclose(evaluations.table["poissons_ratio"], 0.45, rtol=1e-12)
+    np.testing.assert_allclose(evaluations.table["elasticity_damping"], 5e-3, rtol=1e-12)
+    best = [evaluations.best_row()[f"unit_{name}"] for name in box.free]
     np.testing.assert_allclose(best, CENTRE[[0, 3, 4]], atol=1e-3)
 
 
 def test_one_free_axis_is_enough() -> None:
     evaluate = quadratic(CENTRE[:1], np.eye(1), names=NAMES[:1])
     budget = changed(population=10, generations=5, k_nn=6, k_top=2, cma_rollouts=64)
-    histories = [alone(name, evaluate, 124, budget, NAMES[:1]) for name in ("de", "bo", "adam")]
-    for history in (*histories, chain(evaluate, budget, NAMES[:1])[1]):
-        assert abs(history.best()["unit_a"] - CENTRE[0]) < 0.02
+    searches = [alone(name, evaluate, 124, budget, NAMES[:1]) for name in ("de", "bo", "adam")]
+    for evaluations in (*searches, chain(evaluate, budget, NAMES[:1])[1]):
+        assert abs(evaluations.best_row()["unit_a"] - CENTRE[0]) < 0.02
 
 
 def test_every_search_has_the_same_budget() -> None:
@@ -171,31 +171,31 @@ def test_an_optimiser_is_deterministic_and_spends_its_budget(torch_threads) -> N
 
 def test_a_history_without_rows_can_be_kept(tmp_path: Path) -> None:
     """What a search of one phase leaves for the second one: the same columns."""
-    empty, full = History("toy", NAMES), alone("de", quadratic(CENTRE, np.eye(5)), 30)
+    empty, full = Evaluations("toy", NAMES), alone("de", quadratic(CENTRE, np.eye(5)), 30)
     empty.save(tmp_path / "empty.parquet")
     full.save(tmp_path / "full.parquet")
-    loaded = History.load("toy", NAMES, tmp_path / "full.parquet", tmp_path / "empty.parquet")
+    loaded = Evaluations.load("toy", NAMES, tmp_path / "full.parquet", tmp_path / "empty.parquet")
     assert loaded.table.equals(full.table)
-    assert len(History.load("toy", NAMES, tmp_path / "empty.parquet").total) == 0
+    assert len(Evaluations.load("toy", NAMES, tmp_path / "empty.parquet").total) == 0
 
 
 def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
     paths = tmp_path / "a.parquet", tmp_path / "b.parquet"
-    for path, history in zip(paths, chain(quadratic(CENTRE, VALLEY))[:2], strict=True):
-        history.save(path)
+    for path, evaluations in zip(paths, chain(quadratic(CENTRE, VALLEY))[:2], strict=True):
+        evaluations.save(path)
     for files, phase, names in (
         (paths, "cma", NAMES),
         (paths[:1] * 2, "de", NAMES),
         (paths, "cma", NAMES[:3]),
     ):
-        history = History.load("toy", names, *files)
-        content, best = theta_content(history, "band1", {}), history.best()
-        assert best["total"] == content["loss"]["total"] == history.total.min()
+        evaluations = Evaluations.load("toy", names, *files)
+        content, best = theta_content(evaluations, "band1", {}), evaluations.best_row()
+        assert best["total"] == content["loss"]["total"] == evaluations.total.min()
         assert content["theta"] == {name: best[name] for name in names}
         np.testing.assert_array_equal(
-            list(content["theta"].values()), 10 * history.unit[np.argmin(history.total)]
+            list(content["theta"].values()), 10 * evaluations.unit[np.argmin(evaluations.total)]
         )
-        assert content["rollouts"] == len(history.total)
+        assert content["rollouts"] == len(evaluations.total)
         assert (content["band"], content["method"]) == ("band1", "toy")
         assert content["found"]["phase"] == phase
         assert content["confidence"] is None

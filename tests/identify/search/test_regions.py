@@ -1,4 +1,4 @@
-"""Regions of a history: non-maximum suppression, covariances of neighbours."""
+"""Regions of a search: non-maximum suppression, covariances of neighbours."""
 
 from itertools import combinations
 from types import SimpleNamespace
@@ -77,12 +77,12 @@ def test_a_ball_has_the_determinant_of_its_ellipsoid(seed: int, dimension: int) 
 def test_a_method_may_ask_for_regions_of_its_own() -> None:
     """As many as `optimizer` says unless the method says so, and balls where it asks for them."""
     rng = np.random.default_rng(1)
-    history = SimpleNamespace(unit=rng.random((80, 3)), total=rng.random(80))
+    evaluations = SimpleNamespace(unit=rng.random((80, 3)), total=rng.random(80))
     optimizer = SimpleNamespace(k_top=4, k_nn=15, delta=0.1)
     results = []
     for k_top, covariance, count in ((None, True, 4), (2, False, 2)):
         method = SimpleNamespace(k_top=k_top, covariance=covariance)
-        regions, requested = module.regions_of(method, optimizer, history)
+        regions, requested = module.regions_of(method, optimizer, evaluations)
         assert len(regions) == requested == count
         results.append(regions)
     for ellipsoid, ball in zip(*results, strict=False):

@@ -34,9 +34,9 @@ def test_launches_of_a_method_and_plain_ones(tmp_path) -> None:
         "-0.35,-0.17,,1.925,ours\n,,,,\n\n"
     )
     assert read(tmp_path, text) == [
-        Measured((-0.3, -0.17), 2.2, None),
-        Measured((-0.31, -0.17), 1.9, 1.925, "ours"),
-        Measured((-0.35, -0.17), None, 1.925, "ours"),
+        Measured(draw=(-0.3, -0.17), landing=2.2, target=None),
+        Measured(draw=(-0.31, -0.17), landing=1.9, target=1.925, method="ours"),
+        Measured(draw=(-0.35, -0.17), landing=None, target=1.925, method="ours"),
     ]
     assert [launch.landing for launch in read(tmp_path, text, "theirs")] == [2.2, 1.8]
 
@@ -53,7 +53,9 @@ def test_a_target_without_a_method_is_nobodys(tmp_path) -> None:
 
 def test_a_method_may_launch_without_a_target(tmp_path) -> None:
     text = f"{HEAD},method\n-0.3,-0.1,1.9,ours\n"
-    assert read(tmp_path, text) == [Measured((-0.3, -0.1), 1.9, None, "ours")]
+    assert read(tmp_path, text) == [
+        Measured(draw=(-0.3, -0.1), landing=1.9, target=None, method="ours")
+    ]
     assert read(tmp_path, text, "theirs") == []
 
 

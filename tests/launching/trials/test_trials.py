@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from pipeline.launching.trials.trials import SCHEMA, Batch, launched, table
+from pipeline.launching.trials.trials import SCHEMA, Batch, launch_virtually, table
 from pipeline.params import load
 from pipeline.simulator.launch import Launches, launch, limited
 from pipeline.simulator.model import ClampedBand, LaunchSetup
@@ -115,7 +115,7 @@ def landed(draw: np.ndarray, number: int) -> SimpleNamespace:
 
 def test_landings_outside_the_area_stand_beside_their_failure() -> None:
     draws = np.tile([-0.3, -0.1], (3, 1))
-    trial = launched(Batch("predicted", draws, [1.9, 1.9, 2.1]), landed)
+    trial = launch_virtually(Batch("predicted", draws, [1.9, 1.9, 2.1]), landed)
     assert (trial.kind, trial.targets) == ("virtual", [1.9, 1.9, 2.1])
     assert trial.draws.tolist() == draws.tolist()
     assert trial.landing == [1.9, 3.0, None]

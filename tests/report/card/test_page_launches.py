@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from pipeline.report.card.inputs import Aims
-from pipeline.report.card.page import launched, step
+from pipeline.report.card.page import flights_at, step
 
 GRAVITY = 9.81
 
@@ -38,7 +38,7 @@ def test_flights_landings_and_intervals_by_target() -> None:
         samples=np.zeros((3, 0)),
         failure=[None, None, "out of reach"],
     )
-    first, second = launched(trials, aims)
+    first, second = flights_at(trials, aims)
     assert (first["target"], first["draw"], first["interval"]) == (2000, [-300, -150], [1900, 2100])
     np.testing.assert_allclose(np.reshape(first["flights"][0], (-1, 2)), 1000 * way, atol=0.5)
     assert first["landings"] == [2000]

@@ -48,7 +48,8 @@ def test_a_band_of_the_rig_has_a_floor(root, params) -> None:
 def test_measured_launches_of_a_method_that_does_not_run_are_counted(root, params) -> None:
     assert gather(params, root).unused == {}
     methods = [METHOD, "", "de", "de", "bo"]
-    launches = [Measured((-0.3, -0.2), 1.9, 1.9, method) for method in methods]
+    launch = {"draw": (-0.3, -0.2), "landing": 1.9, "target": 1.9}
+    launches = [Measured(**launch, method=method) for method in methods]
     save_scores(Layout(root).scores(BAND), launches)
     assert gather(params, root).unused == {BAND: 3}
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.export.mesh import Tube
 from pipeline.export.replay import Shot
 from pipeline.export.usd import RATE, UsdBand
@@ -83,8 +84,7 @@ def job_of(band: UsdBand, places: np.ndarray, offsets: np.ndarray, steps: Steps)
     """
     flat = band.tube.clamped.reshape(-1, 3)
     hang, pull, hold = (round(time * steps.rate) for time in steps.times)
-    part = np.minimum(np.arange(1, pull + hold + 1) / pull, 1)
-    part = part**3 * (10 - 15 * part + 6 * part**2)
+    part = minimum_jerk(np.arange(1, pull + hold + 1) / pull)
     begin = flat[band.hand].mean(axis=0)
     path = begin + part[:, None, None] * (places - begin)
     led = led_to(band.tube, path.reshape(-1, 3))

@@ -19,6 +19,7 @@ import numpy as np
 
 from pipeline.base import errors
 from pipeline.base.errors import UserError
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.export.mesh import Tube
 from pipeline.identify.results.mounting import load_sling
 from pipeline.params import Params, load
@@ -67,8 +68,7 @@ def course(tube: Tube, draws: np.ndarray, rate: int) -> list[Drive]:
     """Hang; then led straight to each of the draws (N, 2), and at rest there."""
     hand = np.arange(tube.mass.size).reshape(tube.rest.shape[:2])[tube.middle]
     times = np.arange(1, round((PULL + REST) * rate) + 1) / rate
-    part = np.minimum(times / PULL, 1)
-    fade = 1 - part**3 * (10 - 15 * part + 6 * part**2)
+    fade = 1 - minimum_jerk(times / PULL)
     targets = led_to(tube, np.column_stack([np.zeros(len(draws)), draws]))[None]
     led = np.concatenate([clamped(tube)[0], hand])
     return [hanging(tube, rate), Drive(led, targets, fade, np.zeros(len(times), bool))]

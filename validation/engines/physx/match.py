@@ -44,7 +44,7 @@ def matched(model: CalibratedBand, band: UsdBand) -> UsdMatch | None:
         return None
     with Engine() as engine:
         best = fitted(engine, model, band)
-        near, others = near_draws(model), proof_draws(model)
+        (near, _), others = near_draws(model), proof_draws(model)
         match, proof, on_paper = (
             compared(model, draws, _launched_singly(engine, model, same, draws))
             for same, draws in ((best, near), (best, others), (band, others))
@@ -54,8 +54,7 @@ def matched(model: CalibratedBand, band: UsdBand) -> UsdMatch | None:
 
 def fitted(engine: Engine, model: CalibratedBand, band: UsdBand) -> UsdBand:
     """Modulus and mass of which `near_draws` are held and land as in the calibrated simulation."""
-    draws = near_draws(model)
-    ours, point = model.launches(draws), np.zeros(2)
+    (draws, ours), point = near_draws(model), np.zeros(2)
     for widths in ROUNDS:
         grid = point + np.array(
             [[side * widths[0], other * widths[1]] for other in (-1, 0, 1) for side in (-1, 0, 1)]

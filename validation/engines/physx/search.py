@@ -29,8 +29,8 @@ from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.loss import TERMS
 from pipeline.identify.objective.session import service
 from pipeline.identify.results.mounting import sling_of_method
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.identify.search.explore import rollouts_of
-from pipeline.identify.search.history import History
 from pipeline.params import load
 from pipeline.params.identification import OUR_ENGINE
 from pipeline.simulator.launch import launch
@@ -61,14 +61,14 @@ class Comparison:
         self.setup = LaunchSetup.of(params.setup, params.sling)
         self.box = SearchBox.of_method(self.params, OURS)
 
-    def search(self, engine: str) -> tuple[History, float]:
+    def search(self, engine: str) -> tuple[Evaluations, float]:
         """Everything that was evaluated, and the seconds that it took (less what was recalled)."""
         optimizer = self.params.optimizer
         total = rollouts_of(self.params, engine) + optimizer.cma_rollouts  # a multistart
         evaluate = service("search", self.band, engine, self.params, total)
         began = time.perf_counter()
-        history = evaluations_of(self.params, engine, evaluate)
-        return history, time.perf_counter() - began
+        evaluations = evaluations_of(self.params, engine, evaluate)
+        return evaluations, time.perf_counter() - began
 
     def losses(self, thetas: np.ndarray) -> dict[str, list[dict]]:
         """Terms of the loss of thetas (N, 5) by engine; None where one failed."""
@@ -158,13 +158,13 @@ def main() -> None:
         draws, measured = draws_of(params.setup), None
     comparison, content, thetas = Comparison(params, requested.band), {}, []
     for name in (OURS, PHYSX):
-        history, seconds = comparison.search(name)
-        best = history.best()
+        evaluations, seconds = comparison.search(name)
+        best = evaluations.best_row()
         thetas.append([best[parameter] for parameter in comparison.box.names])
         content[name] = {
             "theta": dict(zip(comparison.box.names, thetas[-1], strict=True)),
-            "rollouts": len(history.total),
-            "failed": int(np.isinf(history.total).sum()),
+            "rollouts": len(evaluations.total),
+            "failed": int(np.isinf(evaluations.total).sum()),
             "seconds": seconds,
         }
     for where, rows in comparison.losses(np.array(thetas)).items():

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.export.mesh import Tube
 from pipeline.simulator.interaction import GRASP_BLEND, interact
 from pipeline.simulator.model import GRAVITY, ClampedBand
@@ -89,13 +90,12 @@ def phases(tube: Tube, episode, rate: int, marked: bool = True) -> list[Drive]:
     times = episode.release_time - held[-1] + held
     path = CubicSpline(episode.time, episode.position)(times)
     led = path[:, None] + tube.rest[tube.middle] * [0.0, 1.0, 1.0]
-    part = np.minimum(held / GRASP_BLEND, 1)
     return [
         hanging(tube, rate),
         Drive(
             np.concatenate([clamps, hand]),
             np.concatenate([still(held), led], axis=1),
-            1 - part**3 * (10 - 15 * part + 6 * part**2),
+            1 - minimum_jerk(held / GRASP_BLEND),
             keep(held),
         ),
         Drive(clamps, still(free), np.zeros(len(free)), keep(free)),

@@ -2,7 +2,7 @@
 
 The solver of a region searches z from N(0, I), and θ = mu + L z with L L' = Sigma, so that its
 first samples follow the region's covariance. Points outside the box are reflected into it: the
-evaluated point is what the history records.
+evaluated point is what the evaluations record.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.optimizers.cma.multistart import Multistart
-from pipeline.identify.search.history import History
+from pipeline.identify.search.evaluations import Evaluations
 from pipeline.identify.search.loop import search
 from pipeline.identify.search.regions import Region
 from pipeline.params import Params
@@ -20,7 +20,7 @@ def refine(
     method: str,
     regions: Sequence[Region],
     evaluate: Callable[[np.ndarray], Evaluation],
-) -> History:
+) -> Evaluations:
     """Everything that a CMA-ES in each region evaluates, `optimizer.cma_rollouts` in all.
 
     Args:
@@ -28,12 +28,12 @@ def refine(
         evaluate: Losses of points of the whole unit cube, shape (N, D).
     """
     optimizer, box = params.optimizer, SearchBox.of_method(params, method)
-    history = History(method, box.names)
+    evaluations = Evaluations(method, box.names)
     search(
         Multistart(list(regions), population=optimizer.cma_population, seed=optimizer.seed),
         evaluate,
-        history,
+        evaluations,
         rollouts=optimizer.cma_rollouts,
         box=box,
     )
-    return history
+    return evaluations

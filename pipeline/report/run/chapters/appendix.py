@@ -15,12 +15,7 @@ from pipeline.report.run.report import Report
 from pipeline.report.run.results import has_another_loss
 from pipeline.report.run.tables import differences, identified
 from pipeline.report.run.tables.cells import markdown, percent
-from pipeline.report.run.tables.landings import (
-    LAUNCHED,
-    of_kind,
-    prediction_summary,
-    predictions,
-)
+from pipeline.report.run.tables.landings import LAUNCHED, of_kind, prediction_summary, predictions
 from pipeline.report.run.tables.policies import policies
 
 

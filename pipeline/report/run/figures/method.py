@@ -26,7 +26,7 @@ LEVELS = 12
 @picture(BOXED | {"figure.constrained_layout.use": True})
 def method(result: Result, chart: Landscape, boxes: ParameterBoxes) -> Figure:
     """Three panels, one above the other: exploration, regions, CMA-ES."""
-    history, (x, y) = result.history, AXES
+    evaluations, (x, y) = result.evaluations, AXES
     figure, axes = plt.subplots(3, 1, figsize=(5.2, 7.6), sharex=True, sharey=True)
     entitle(figure, f"How the search of the paper's loss goes ({result.band})")
     finite = chart.loss[np.isfinite(chart.loss)]
@@ -34,13 +34,13 @@ def method(result: Result, chart: Landscape, boxes: ParameterBoxes) -> Figure:
     shades = ScalarMappable(LogNorm(least, max(most, 1.01 * least)), "viridis")
     levels = np.geomspace(least, max(most, 1.01 * least), LEVELS)
     titles = "1 exploration by DE", "2 the best regions, their covariances", "3 CMA-ES in each"
-    best = history.total.to_numpy(float).argmin()
+    best = evaluations.total.to_numpy(float).argmin()
     for step, (ax, title) in enumerate(zip(axes, titles, strict=True)):
         loss = np.ma.masked_invalid(chart.loss)
         style = {"levels": levels, "cmap": shades.cmap, "norm": shades.norm, "extend": "max"}
         ax.set_facecolor("0.85")
         ax.contourf(chart.x, chart.y, loss, **style)
-        explored = history.loc[history.phase == "de"]
+        explored = evaluations.loc[evaluations.phase == "de"]
         failed = ~np.isfinite(explored.total)
         size = 10 if step == 0 else 3
         good = explored.loc[~failed]
@@ -51,7 +51,7 @@ def method(result: Result, chart: Landscape, boxes: ParameterBoxes) -> Figure:
             regions(ax, result, x, y, paths=step == 2)
         if step == 2:
             star = {"color": STAR, "mec": INK, "ms": 13, "mew": 0.8, "zorder": 6}
-            ax.plot(history[f"unit_{x}"][best], history[f"unit_{y}"][best], "*", **star)
+            ax.plot(evaluations[f"unit_{x}"][best], evaluations[f"unit_{y}"][best], "*", **star)
         ax.set(xlim=chart.x[[0, -1]], ylim=chart.y[[0, -1]], ylabel=QUANTITIES[y].heading)
         ax.set_yticks(*_ticks(y, boxes, chart.y))
         ax.set_title(title, fontsize=9, loc="left")

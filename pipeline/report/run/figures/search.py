@@ -1,4 +1,4 @@
-"""What the searches evaluated: convergence, and the history in the unit cube."""
+"""What the searches evaluated: convergence, and where in the unit cube."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> Figur
     for band, ax in axes_of.items():
         ends = []
         for method, result in searches[band].items():
-            common = printed(result.history)
-            best = common[best_so_far(result.history)]
+            common = printed(result.evaluations)
+            best = common[best_so_far(result.evaluations)]
             best = np.where(np.isfinite(best), best, np.nan)
             style = {"color": styles[method].color, "ls": dashes[method], "lw": 1.3}
             ax.plot(rollouts(result), best, drawstyle="steps-post", **style)
@@ -63,11 +63,11 @@ def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> Figur
 
 
 def rollouts(result: Result) -> np.ndarray:
-    """How many rollouts the search had spent at each row of its history, shape (N,).
+    """How many rollouts the search had spent at each of its evaluations, shape (N,).
 
     A fit keeps one row of all that it spends.
     """
-    spent = np.arange(1, len(result.history) + 1)
+    spent = np.arange(1, len(result.evaluations) + 1)
     spent[-1] = max(spent[-1], result.theta.get("rollouts", 0))
     return spent
 
@@ -80,11 +80,11 @@ def corner(result: Result, boxes: ParameterBoxes, title: str) -> Figure:
         boxes: params.yaml's `parameters`: low, high and scale of each axis.
         title: Whose search it is.
     """
-    history = result.history
-    unit = {n[5:]: history[n].to_numpy(float) for n in history if n.startswith("unit_")}
+    evaluations = result.evaluations
+    unit = {n[5:]: evaluations[n].to_numpy(float) for n in evaluations if n.startswith("unit_")}
     free = [name for name, values in unit.items() if np.ptp(values) > 0] or list(unit)
     size = len(free)
-    total = history.total.to_numpy(float)
+    total = evaluations.total.to_numpy(float)
     good = np.flatnonzero(np.isfinite(total))
     good = good[np.argsort(-total[good], kind="stable")]  # the best on top
     failed = ~np.isfinite(total)
@@ -92,7 +92,7 @@ def corner(result: Result, boxes: ParameterBoxes, title: str) -> Figure:
     worst = max(np.quantile(total[good], SHOWN), 1.001 * total[best])
     shades = ScalarMappable(LogNorm(total[best], worst), "viridis")
     color = {"c": total[good], "cmap": shades.cmap, "norm": shades.norm}
-    sizes = np.where(history.phase.to_numpy()[good] == "cma", 5, 14)
+    sizes = np.where(evaluations.phase.to_numpy()[good] == "cma", 5, 14)
     star = {"color": STAR, "mec": INK}
     inches = 1.4 + 1.55 * max(size, 3)
     figure, axes = plt.subplots(size, size, figsize=(inches, inches), squeeze=False)
@@ -118,9 +118,9 @@ def corner(result: Result, boxes: ParameterBoxes, title: str) -> Figure:
             regions(ax, result, x, y)
             ax.plot(unit[x][best], unit[y][best], "*", ms=12, mew=0.8, zorder=6, **star)
             ax.set(ylim=(0, 1))
-            ax.set_yticks(*_ticks(y, boxes, history), fontsize=7)
+            ax.set_yticks(*_ticks(y, boxes, evaluations), fontsize=7)
         ax.set(xlim=(0, 1))
-        ax.set_xticks(*_ticks(x, boxes, history), fontsize=7)
+        ax.set_xticks(*_ticks(x, boxes, evaluations), fontsize=7)
         if row == size - 1:
             ax.set_xlabel(QUANTITIES[x].heading)
         else:
@@ -140,7 +140,7 @@ def corner(result: Result, boxes: ParameterBoxes, title: str) -> Figure:
 
 def regions(ax: Axes, result: Result, x: str, y: str, paths: bool = True) -> None:
     """Centres of the regions, their covariances at one deviation, and the paths of CMA-ES."""
-    refined = result.history.loc[result.history.phase == "cma"]
+    refined = result.evaluations.loc[result.evaluations.phase == "cma"]
     searched = {x, y} <= set(result.axes)
     for number, region in enumerate(result.regions if searched else ()):
         index = [result.axes.index(x), result.axes.index(y)]
@@ -162,7 +162,7 @@ def regions(ax: Axes, result: Result, x: str, y: str, paths: bool = True) -> Non
 def _key(figure: Figure, result: Result, failures: bool) -> None:
     """Legend in the empty corner."""
     entries = [("evaluated by the exploration", mark(ls="", marker="o", ms=4, color="0.4"))]
-    if (result.history.phase == "cma").any():
+    if (result.evaluations.phase == "cma").any():
         entries.append(("evaluated by CMA-ES", mark(ls="", marker="o", ms=2, color="0.4")))
     if failures:
         entries.append(("simulation failed", mark(ls="", marker="x", ms=4, color="0.6")))
@@ -178,10 +178,10 @@ def _key(figure: Figure, result: Result, failures: bool) -> None:
 
 
 def _ticks(
-    name: str, boxes: ParameterBoxes, history: pd.DataFrame
+    name: str, boxes: ParameterBoxes, evaluations: pd.DataFrame
 ) -> tuple[list[float], list[str]]:
     """Places in the unit cube of round physical values, and those values in words."""
-    unit, value = (history[column].to_numpy(float) for column in (f"unit_{name}", name))
+    unit, value = (evaluations[column].to_numpy(float) for column in (f"unit_{name}", name))
     value = value * QUANTITIES[name].factor
     log = name in THETA and getattr(boxes, name).scale == "log"
     scaled = np.log10(value) if log else value

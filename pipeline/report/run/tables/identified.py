@@ -152,7 +152,7 @@ def losses(results: Results, params: Params, styles: Styles) -> Table:
             share = share if np.isfinite(value) and not another else ""
             cells.append(number(value, ".3g") + share)
         common = printed_loss(result)
-        spent = result.theta.get("rollouts", len(result.history))
+        spent = result.theta.get("rollouts", len(result.evaluations))
         cells += [number(total, ".4g"), number(common, ".4g"), str(spent)]
         rows.append([result.band, styles[result.method].name, *cells])
     return heads, rows

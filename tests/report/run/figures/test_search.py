@@ -61,7 +61,7 @@ def test_an_ellipse_lies_along_its_covariance(retained, result, params) -> None:
 
 def test_axes_that_are_held_fixed_are_left_out(retained, result, params) -> None:
     for name in ("poissons_ratio", "elasticity_damping", "damping_scale"):
-        result.history[f"unit_{name}"] = 0.5
+        result.evaluations[f"unit_{name}"] = 0.5
     search.corner("", result, params.parameters, "x")
     assert len(pairs(retained[0])) == 1
 

@@ -37,7 +37,7 @@ def of_strings(monkeypatch) -> None:
 
 def held(model, band) -> np.ndarray:
     """Errors of the force at the draws of the match."""
-    draws, engine = near_draws(model), StringEngine(band.tube)
+    (draws, _), engine = near_draws(model), StringEngine(band.tube)
     shots = match._launched_singly(engine, model, band, draws)
     return np.array([row.errors["hold_force"] for row in compared(model, draws, shots)])
 
@@ -110,7 +110,7 @@ def test_an_export_is_matched_where_it_can_be(model, monkeypatch, tmp_path) -> N
 
 
 def test_what_is_matched_is_what_lands_near_the_targets(model) -> None:
-    draws = near_draws(model)
+    draws, _ = near_draws(model)
     near, far = model.settings.policy.targets
     landing = model.launches(draws).landing_y
     assert (landing > near / usd.NEAR).all() and (landing < far * usd.NEAR).all()

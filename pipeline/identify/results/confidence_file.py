@@ -1,8 +1,8 @@
 """data/confidence/: what a search says of θ beside its evaluations, as every search writes it.
 
 {"band": "...", "names": [...], "samples": [[...], ...], "estimate": {...}}: samples of the
-posterior, none where the search has none; and the entries of the θ file that no table of
-evaluations holds, such as its confidence.
+posterior, none where the search has none; and under `estimate` the entries of the θ file that no
+table of evaluations holds, such as its confidence.
 """
 
 from __future__ import annotations
@@ -18,26 +18,23 @@ from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import RUBBER
 
 
-class EstimateFile(PosteriorFile):
+class ConfidenceFile(PosteriorFile):
     band: str
     estimate: dict
 
 
-def save_estimate(
-    path: Path,
-    band: str,
-    estimate: dict,
-    samples: Parameters | None = None,
+def save_confidence(
+    path: Path, band: str, entries: dict, samples: Parameters | None = None
 ) -> None:
-    """Write an `EstimateFile`."""
+    """Write a `ConfidenceFile`."""
     names, values = ([], []) if samples is None else ([*samples.names], samples.values.tolist())
-    content = {"band": band, "names": names, "samples": values, "estimate": estimate}
+    content = {"band": band, "names": names, "samples": values, "estimate": entries}
     write_json(path, content)
 
 
-def load_estimate(path: Path) -> dict:
+def load_confidence(path: Path) -> dict:
     """The entries of the θ file that such a file holds. Raises NotMade."""
-    return read_json(path, EstimateFile).estimate
+    return read_json(path, ConfidenceFile).estimate
 
 
 def law_entries(episode: Episode, law: str) -> dict:

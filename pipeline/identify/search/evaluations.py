@@ -23,7 +23,7 @@ from pipeline.simulator.parameters import Parameters
 
 
 @dataclass
-class History:
+class Evaluations:
     """Rows in the order in which they were evaluated."""
 
     method: str
@@ -78,26 +78,26 @@ class History:
             pq.write_table(self.table, temporary)
 
     @classmethod
-    def load(cls, method: str, names: tuple[str, ...], *paths: Path) -> History:
+    def load(cls, method: str, names: tuple[str, ...], *paths: Path) -> Evaluations:
         """Read files that `save` wrote, one after the other."""
         return cls(method, names, [read_table(path) for path in paths])
 
-    def followed_by(self, other: History) -> History:
+    def followed_by(self, other: Evaluations) -> Evaluations:
         """These rows, then those of `other`."""
-        return History(self.method, self.names, [self.table, other.table])
+        return Evaluations(self.method, self.names, [self.table, other.table])
 
-    def of_phase(self, phase: str) -> History:
+    def of_phase(self, phase: str) -> Evaluations:
         """The rows of one phase alone."""
         table = self.table
         chosen = pa.array(table["phase"].to_numpy() == phase)
-        return History(self.method, self.names, [table.filter(chosen)])
+        return Evaluations(self.method, self.names, [table.filter(chosen)])
 
     def best_parameters(self, law: str) -> Parameters:
-        """One sample, of the best row. Raises UserError as `best`."""
-        best = self.best()
+        """One sample, of the best row. Raises UserError as `best_row`."""
+        best = self.best_row()
         return Parameters.named(law, {name: best[name] for name in self.names})
 
-    def best(self) -> dict:
+    def best_row(self) -> dict:
         """The row with the least total; among equals the first. Raises UserError if all failed."""
         total = self.total
         if not np.isfinite(total).any():
@@ -109,26 +109,26 @@ class History:
         return self.table.slice(int(np.argmin(total)), 1).to_pylist()[0]
 
 
-def theta_content(evaluations: History, band: str, estimate: dict) -> dict:
+def theta_content(evaluations: Evaluations, band: str, entries: dict) -> dict:
     """What a θ file holds: the mode of a density where one was fitted, else the best evaluation.
 
     Args:
         evaluations: Everything that a search evaluated; a density's mode is a phase of its own.
-        estimate: What else the search says of θ (identify/results/estimate.py).
+        entries: What else the search says of θ (identify/results/confidence_file.py).
     """
     mode = evaluations.of_phase(LEAST_SQUARES)
-    history = mode if len(mode.total) else evaluations
-    best = history.best()
+    chosen = mode if len(mode.total) else evaluations
+    best = chosen.best_row()
     terms = {name: best[name] for name in (*TERMS, "total") if np.isfinite(best[name])}
     return {
         "band": band,
-        "method": history.method,
-        "theta": {name: best[name] for name in history.names},
+        "method": chosen.method,
+        "theta": {name: best[name] for name in chosen.names},
         "nuisances": {},
         "loss": terms,
-        "rollouts": len(history.total),
-        "failed": int(np.isinf(history.total).sum()),
+        "rollouts": len(chosen.total),
+        "failed": int(np.isinf(chosen.total).sum()),
         "found": {name: best[name] for name in ("phase", "generation", "solver")},
         "confidence": None,
-        **estimate,
+        **entries,
     }

@@ -112,11 +112,7 @@ def _measured(
 
 
 def _seen(
-    rollout: Rollouts,
-    sling: ClampedBand,
-    true: Episode,
-    has: Tolerances,
-    rng: np.random.Generator,
+    rollout: Rollouts, sling: ClampedBand, true: Episode, has: Tolerances, rng: np.random.Generator
 ) -> list[np.ndarray]:
     """Clouds of a rollout; each bin of the band in each picture is off by as much as it may be."""
     turn, shift = Rotation.from_rotvec(rng.normal(0, has.turn, 3)), rng.normal(0, has.shift, 3)

@@ -18,7 +18,7 @@ import psutil
 from ruamel.yaml import YAML
 
 from pipeline.base.code import ROOT
-from pipeline.params import load
+from pipeline.params import Params, load
 from pipeline.params.identification import methods_by_step
 
 DEFAULTS = ROOT / "validation" / "params.yaml"  # as delivered, whatever a user sets in params.yaml
@@ -79,13 +79,29 @@ def set_params(folder: Path, values: Mapping[str, object]) -> None:
     """Set values in params.yaml of a project, by keys with dots."""
     yaml, path = YAML(), folder / "params.yaml"
     content = yaml.load(path)
+    _set(content, values)
+    yaml.dump(content, path)
+
+
+def changed(params: Params, values: Mapping[str, object]) -> Params:
+    """Parameters with other values, by keys with dots, checked again."""
+    content = params.model_dump(mode="json", exclude_unset=True)
+    _set(content, values)
+    return type(params).model_validate(content)
+
+
+def with_section(params: Params, name: str, **values: object) -> Params:
+    """Parameters with other values in one section, which are not checked."""
+    return params.model_copy(update={name: getattr(params, name).model_copy(update=values)})
+
+
+def _set(content: dict, values: Mapping[str, object]) -> None:
     for key, value in values.items():
         *sections, name = key.split(".")
         node = content
         for section in sections:
             node = node[section]
         node[name] = value
-    yaml.dump(content, path)
 
 
 def run_of(

@@ -27,11 +27,10 @@ from pathlib import Path
 
 from pipeline.base import errors
 from pipeline.base.code import ROOT, digests
-from pipeline.base.environment import environment
-from pipeline.base.files import write_json
 from validation.campaigns import runner
 from validation.campaigns.runner import Result, ResultLines
 from validation.projects import SLING, TINY, ProjectCopy, copy_project, run_of
+from validation.reports import write_report
 
 WORK, REPORT = Path("build/conditions"), Path("reports/validation/conditions.json")
 LIMIT = 900.0  # s for a command
@@ -324,13 +323,14 @@ def report(results: list[Result]) -> dict:
 
 
 def main() -> int:
-    options = runner.parser(__doc__ or "", REPORT, WORK)
+    options = runner.parser(__doc__, REPORT, WORK)
     options.add_argument("--only", metavar="WORD", default="", help="cells with it in their names")
     given = options.parse_args()
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a shell's background
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    work = given.work.resolve()
-    template(work)
+    work, end = given.work.resolve(), time.monotonic() + 60 * given.minutes
+    if not given.report_only:
+        template(work)
     lines = ResultLines(work / "results.jsonl")
     conditions, left = [*CONDITIONS], [] if os.geteuid() == 0 else [*ROOTS]
     if left:
@@ -342,7 +342,8 @@ def main() -> int:
     there = lines.of(Cell)
 
     def run_cell(cell: Cell) -> None:
-        if cell not in there or there[cell]["faults"]:
+        wanted = cell not in there or there[cell]["faults"]
+        if wanted and not given.report_only and time.monotonic() < end:
             lines.add(result := run(cell, work))
             print(
                 f"{cell.condition}: {cell.command}: {result['faults'] or 'as expected'}", flush=True
@@ -351,12 +352,11 @@ def main() -> int:
     with ThreadPoolExecutor(given.workers) as pool:
         for _ in pool.map(run_cell, cells):  # raises what a cell raises
             pass
-    results = [lines.of(Cell)[cell] for cell in cells]
-    if not given.only and not left:
-        provenance = environment("cpu", "python -m validation.campaigns.conditions")
+    results = runner.expect(lines.among(cells), work)
+    if not given.only and not left and len(results) == len(cells):
         code = digests(Path(__file__), ROOT / "app/cli.py")
-        write_json(given.report, provenance | {"code": code} | report(results))
-    return int(any(result["faults"] for result in results))
+        write_report(given.report, report(results) | {"code": code})
+    return int(len(results) < len(cells) or any(result["faults"] for result in results))
 
 
 if __name__ == "__main__":

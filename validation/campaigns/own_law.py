@@ -18,14 +18,13 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
-from pipeline.base.files import write_json
 from pipeline.params import load
 from validation.campaigns import runner
-from validation.campaigns.runner import OURS, ResultLines, plain, result_of
+from validation.campaigns.runner import OURS
 from validation.own_law import ranked
 from validation.projects import DEFAULTS
 from validation.ranks import summary
+from validation.reports import write_report
 
 WORK, REPORT = Path(".checkpoints/own-law"), Path("reports/validation/density-own-law.json")
 PULLS, EPISODES = ("informative", "paper"), 200
@@ -40,11 +39,10 @@ class Drawn:
     number: int
 
 
-def performed(job: Drawn) -> dict:
+def identified(job: Drawn) -> dict:
     params = load(DEFAULTS)
     dips = params.plan.dips if job.pull == "informative" else ()
-    seed = [19, PULLS.index(job.pull), job.number]
-    return result_of(job, lambda: ranked(params, OURS, dips, seed))
+    return ranked(params, OURS, dips, [19, PULLS.index(job.pull), job.number])
 
 
 def figures(lines: list[dict]) -> dict:
@@ -71,25 +69,20 @@ def figures(lines: list[dict]) -> dict:
 
 
 def main() -> None:
-    parser = runner.parser(str(__doc__), REPORT, WORK, minutes=True)
+    parser = runner.parser(__doc__, REPORT, WORK)
     parser.add_argument("--episodes", type=int, default=EPISODES, help="of each pull, at most")
-    parser.add_argument("--report-only", action="store_true", help="of what is there")
     args = parser.parse_args()
     todo = [Drawn(pull, number) for number in range(args.episodes) for pull in PULLS]
-    results = ResultLines(args.work.resolve() / "results.jsonl")
-    if not args.report_only:
-        runner.run(performed, todo, results, args.workers, args.minutes)
-    lines = results.among(todo)
-    report = environment("cpu", "python -m validation.campaigns.own_law") | {
+    lines = runner.results_of(args, identified, todo)
+    content = {
         "kind": "virtual",
         "asked": "90 % intervals of each coordinate and of a launch hold 85 to 95 % of 200 truths"
         " that are drawn from the priors, with all nuisances.",
         "jobs": [len(lines), len(todo)],
-        "figures": plain(figures(lines), 4),
-        "episodes": plain(lines, 4),
+        "figures": figures(lines),
+        "episodes": lines,
     }
-    write_json(args.report, report)
-    for pull, pull_figures in report["figures"].items():
+    for pull, pull_figures in write_report(args.report, content, digits=4)["figures"].items():
         print(f"{pull}: {pull_figures['episodes']} episodes, {pull_figures['settled']} settled")
         for name, rank in pull_figures["ranks"].items():
             print(f"  {name}: {rank}")

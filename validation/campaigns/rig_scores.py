@@ -89,12 +89,7 @@ class RigIdentification:
 
 
 def identified(
-    params: Params,
-    band: str,
-    method: str,
-    seed: int,
-    folder: Path,
-    recorded_pads: bool = False,
+    params: Params, band: str, method: str, seed: int, folder: Path, recorded_pads: bool = False
 ) -> RigIdentification:
     """Identify the episode in `folder` with a seed of the search. Raises UserError.
 

@@ -90,27 +90,21 @@ def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> li
     against = "closed form in uniaxial stress, P = μ (λ − J/λ²)"
     checks = [
         Measure(
-            f"pull of a straight string at stretch {stretch:g}, worst of E and ν",
-            against,
-            off(*straight_pull(bench, stretch, theta, STRING)),
-            "%",
-            PULL_LIMIT,
+            f"pull of a straight string at stretch {stretch:g}, worst of E and ν", against,
+            off(*straight_pull(bench, stretch, theta, STRING)), "%", PULL_LIMIT,
             f"a string {STRING} times thinner than the band; {len(theta)} pairs,"
             " E 0.03–10 MPa, ν 0.30–0.49, single precision",
         )
         for stretch in stretches
-    ]
+    ]  # fmt: skip
     checks.append(
         Measure(
-            f"pull of the band itself at stretch {stretches[0]:g}, worst of E and ν",
-            against,
-            off(*straight_pull(bench, stretches[0], theta)),
-            "%",
-            None,
+            f"pull of the band itself at stretch {stretches[0]:g}, worst of E and ν", against,
+            off(*straight_pull(bench, stretches[0], theta)), "%", None,
             "of its full thickness; clamp and fingers keep their sections from thinning, which"
             " stiffens it: no string",
         )
-    )
+    )  # fmt: skip
     width, length = band_of(bench).half_width, band_of(bench).rest_length
     for stretch in DRAWN:
         depth = np.sqrt((stretch * length / 2) ** 2 - width**2)
@@ -118,13 +112,11 @@ def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> li
             Measure(
                 f"hold force of a draw of {depth:.2f} m (stretch {stretch:g}), worst of E and ν",
                 f"two straight strings, {against}",
-                off(*drawn_pull(bench, depth, theta)),
-                "%",
-                PULL_LIMIT if stretch > SOFT else None,
+                off(*drawn_pull(bench, depth, theta)), "%", PULL_LIMIT if stretch > SOFT else None,
                 "as `launch` gives it, single precision; bending at tips and pouch"
                 + (" hardly counts" if stretch > SOFT else " counts, and is no string's"),
             )
-        )
+        )  # fmt: skip
     return checks
 
 
@@ -170,16 +162,12 @@ def beams(bench: Bench, poissons=BEAM_POISSON, double: bool = True) -> list[Meas
             )
             checks += [
                 Measure(
-                    title,
-                    f"Euler–Bernoulli, {formula}",
-                    off(deflection, 1.0),
-                    "%",
-                    limit,
+                    title, f"Euler–Bernoulli, {formula}", off(deflection, 1.0), "%", limit,
                     f"{deflection:.4f} of it on {count} edges, {note}"
                     + (MESH if all(clamped) and limit else ""),
                 )
                 for title, deflection, limit, count in both
-            ]
+            ]  # fmt: skip
     return checks
 
 
@@ -208,25 +196,17 @@ def torsion(bench: Bench, poissons=BEAM_POISSON) -> list[Measure]:
         note = f"{ratio:.4f} of it"
         checks.append(
             Measure(
-                f"torque at a twist of 0.1 rad, ν {poisson:.2f}",
-                against,
-                off(ratio, 1.0),
-                "%",
-                TORSION_LIMIT,
-                note,
+                f"torque at a twist of 0.1 rad, ν {poisson:.2f}", against,
+                off(ratio, 1.0), "%", TORSION_LIMIT, note,
             )
-        )
+        )  # fmt: skip
     ratio = torque_ratio(bench, np.pi, 0.45)
     checks.append(
         Measure(
-            "torque at half a turn, ν 0.45",
-            against,
-            off(ratio, 1.0),
-            "%",
-            None,
+            "torque at half a turn, ν 0.45", against, off(ratio, 1.0), "%", None,
             f"{ratio:.4f} of it; the small-twist form need not hold there",
         )
-    )
+    )  # fmt: skip
     return checks
 
 

@@ -22,6 +22,8 @@ from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import Schedule, statics
 from pipeline.simulator.solver import Options, Slings, memory, run
 from validation.benchmarks.timing import timed
+from validation.marked import row
+from validation.reports import plain
 from validation.simulator.closed import String, clamped_beam
 from validation.simulator.experiment import setup_of
 from validation.simulator.finding import Bench, Theme
@@ -188,10 +190,7 @@ def table(columns: dict[str, Figures]) -> str:
     slings = [column.sling for column in columns.values()]
     rows: list[tuple[str, list[str]]] = [
         ("edges along the band", [f"{sling.edges}" for sling in slings]),
-        (
-            "degrees of freedom",
-            [f"{sling.sections * sling.dofs:,}" for sling in slings],
-        ),
+        ("degrees of freedom", [f"{sling.sections * sling.dofs:,}" for sling in slings]),
     ]
     for index, depth in enumerate(DEPTHS):
         values = [f"{100 * (column.pull[index] - 1):+.2f} %" for column in columns.values()]
@@ -218,17 +217,12 @@ def table(columns: dict[str, Figures]) -> str:
         ),
     ]
     head = ["| | " + " | ".join(columns) + " |", "|---|" + "---:|" * len(columns)]
-    return "\n".join([*head, *(f"| {name} | " + " | ".join(cells) + " |" for name, cells in rows)])
+    return "\n".join([*head, *(row(name, *cells) for name, cells in rows)])
 
 
 def _milliseconds(seconds: float, of_rod: float) -> str:
     ratio = seconds / of_rod
     return f"{1e3 * seconds:.3g} ms" + (f" (× {ratio:.0f})" if ratio > 1.5 else "")
-
-
-def _known(value: float) -> float | None:
-    """What JSON can hold."""
-    return float(f"{value:.5g}") if np.isfinite(value) else None
 
 
 def section(bench: Bench) -> Theme:
@@ -237,9 +231,9 @@ def section(bench: Bench) -> Theme:
     rod = next(iter(columns.values()))
     details = {
         name: {
-            "pull_over_string": list(map(_known, column.pull)),
-            "bending_over_euler_bernoulli": list(map(_known, column.bending)),
-            "against_the_rod": {key: _known(value) for key, value in compare(column, rod).items()},
+            "pull_over_string": plain(column.pull, 5),
+            "bending_over_euler_bernoulli": plain(column.bending, 5),
+            "against_the_rod": plain(compare(column, rod), 5),
             "cpu_s_a_rollout": column.rollout_seconds,
             "cpu_s_a_launch": column.launch_seconds,
             "bytes_a_rollout": column.memory,

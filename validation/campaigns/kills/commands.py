@@ -71,10 +71,7 @@ class StruckCopy(ProjectCopy):
     def __init__(self, place: Path, work: Path) -> None:
         self.place, self.disk, temporary = place, place / "disk", place / "tmp"
         super().__init__(
-            self.disk / "copy",
-            SLING_WORKERS="1",
-            TMPDIR=str(temporary),
-            **{OF_CAMPAIGN: str(work)},
+            self.disk / "copy", SLING_WORKERS="1", TMPDIR=str(temporary), **{OF_CAMPAIGN: str(work)}
         )
         self.environment["DVC_SITE_CACHE_DIR"] = str(place / "site")
         temporary.mkdir(parents=True, exist_ok=True)

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -130,7 +130,13 @@ def environment(**more: str) -> dict[str, str]:
 
 
 class ProjectCopy:
-    """A folder in which commands run, with `more` in their environment."""
+    """A folder in which commands run, with `more` in their environment.
+
+    Attributes:
+        limit: That a command may take [s]; None: any time.
+    """
+
+    limit: float | None = 1200.0
 
     def __init__(self, folder: Path, **more: str) -> None:
         self.folder = folder
@@ -140,7 +146,7 @@ class ProjectCopy:
     def __call__(self, *command: str) -> str:
         """What a command prints. Raises AssertionError where it fails."""
         options = {"cwd": self.folder, "env": self.environment, "capture_output": True}
-        done = subprocess.run(command, text=True, timeout=1200, **options)
+        done = subprocess.run(command, text=True, timeout=self.limit, **options)
         assert done.returncode == 0, f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}"
         self.errors = done.stderr
         return done.stdout
@@ -190,11 +196,12 @@ class MarkedRun:
         """Processes with `word` in their command line."""
         return [process for process in self.alive() if word in command_line(process)]
 
-    def left(self, seconds: float = PROMPT) -> list[str]:
-        """Commands of what still lives after so long; what does is killed then."""
-        wait(lambda: not self.alive(), seconds)
-        left = self.alive()
-        message = [command_line(process) for process in left]
+    def left(self, seconds: float = PROMPT, apart: Collection[int] = ()) -> list[str]:
+        """Commands of what still lives after so long, but those by number; what does is killed."""
+        alive = lambda: [process for process in self.alive() if process.pid not in apart]  # noqa: E731
+        wait(lambda: not alive(), seconds)
+        left = alive()
+        message = [line for process in left if (line := command_line(process))]
         for process in left:
             send(process)
         return message

@@ -29,6 +29,7 @@ from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import commit
 from validation.benchmarks.command import disk, measured
+from validation.campaigns.runner import read
 from validation.marked import fill, marks
 from validation.reports import write_report
 
@@ -157,10 +158,7 @@ def seconds_of_fit(folder: Path) -> dict[str, int]:
 def perform(step: MeasuredStep, done: dict[str, dict], folder: Path) -> dict:
     """What a step's file in `folder` says; measured now where it is not there or failed."""
     result_file, log = folder / f"{step.name}.json", folder / f"{step.name}.log"
-    if (
-        result_file.is_file()
-        and (result := json.loads(result_file.read_text(encoding="utf-8")))["ok"]
-    ):
+    if result_file.is_file() and (result := read(result_file))["ok"]:
         return result
     if step.needs and not done[step.needs].get("ok"):
         return {"ok": False, "why": f"needs {step.needs}"}
@@ -257,7 +255,7 @@ def times(
         " the peak of the process tree (PSS, looked at once a second); others_share is the share of"
         " the cores that other programs took meanwhile. `sling check` and `sling fit` are of one"
         " recording that was not made here.",
-        "commit": json.loads((folder / "clone.json").read_text(encoding="utf-8"))["commit"],
+        "commit": read(folder / "clone.json")["commit"],
         "simulator": fingerprint(clone / "pipeline/simulator")[:12],
         "code": digests(*(script for script in scripts if script.is_file()), root=clone),
         "steps": done,

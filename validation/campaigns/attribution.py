@@ -15,7 +15,7 @@ After a change of pulls or methods, give another --work.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -32,7 +32,7 @@ from pipeline.params import Params, load
 from rig.oracle.world import World
 from validation.campaigns import runner
 from validation.campaigns.landings import SETS, together
-from validation.campaigns.rig_scores import built, recorded, saved, scored, sling_of, summary
+from validation.campaigns.rig_scores import built, recorded, saved, scored, sling_of, summaries
 from validation.campaigns.runner import OURS, PAPER, read
 from validation.campaigns.variants import priors_of, with_variants
 from validation.density import Calibrated, calibrated_by
@@ -86,11 +86,15 @@ class BandRecording:
     number: int
 
     @property
-    def params(self) -> Params:
+    def lab(self) -> Params:
+        """What the rig's own processes read: without the variants."""
         if self.group == "orange":
-            return with_variants(with_orange(load(DEFAULTS)))
-        seed = BANDS[self.group][0]
-        return with_variants(with_rubbers(load(DEFAULTS), seed, self.number, self.pull))
+            return with_orange(load(DEFAULTS))
+        return with_rubbers(load(DEFAULTS), BANDS[self.group][0], self.number, self.pull)
+
+    @property
+    def params(self) -> Params:
+        return with_variants(self.lab)
 
     def episode(self, work: Path, orange: Path | None) -> Path:
         """The folder of its episode and clamps, made where they are missing."""
@@ -139,11 +143,11 @@ def recoil_of(method: str) -> Iterator[None]:
     def later(rule: Rule, episode: Episode) -> np.ndarray:
         return counted(replace(rule, recoil=rule.latest), episode)
 
-    with ExitStack() as stack:
-        if method == "recoil_trusted_half":
-            stack.enter_context(mock.patch.object(Tolerances, "of", doubled))
-        if method == "later_pictures":
-            stack.enter_context(mock.patch.object(Rule, "frames", later))
+    changes = {
+        "recoil_trusted_half": (Tolerances, "of", doubled),
+        "later_pictures": (Rule, "frames", later),
+    }
+    with mock.patch.object(*changes[method]) if method in changes else nullcontext():
         yield
 
 
@@ -160,7 +164,7 @@ def identified(job: VariantJob, work: Path, orange: Path | None) -> dict:
     if job.group == "orange":
         scores = against_given(outcome, params, *landings(Path(orange or ".")))
     else:
-        file = saved(params_of_rig(job), folder / job.method / "params.yaml")
+        file = saved(job.lab, folder / job.method / "params.yaml")
         with World(job.band, file, workers=1) as world:
             scores = scored(outcome, params, world, seed=job.number)
     return {
@@ -168,11 +172,6 @@ def identified(job: VariantJob, work: Path, orange: Path | None) -> dict:
         "identified": outcome.identified,
         "settled": confidence.get("settled"),
     }
-
-
-def params_of_rig(job: VariantJob) -> Params:
-    """What the rig's own processes read: without the variants."""
-    return with_rubbers(load(DEFAULTS), BANDS[job.group][0], job.number, job.pull)
 
 
 def against_given(
@@ -203,12 +202,7 @@ def figures(lines: list[dict]) -> dict:
             successes = [line for line in some if line["method"] == method and "failed" not in line]
             if not successes:
                 continue
-            unit = "number" if group == "orange" else "band"
-            names = dict.fromkeys(line[unit] for line in successes)
-            of_units = {
-                str(name): summary([line["scores"] for line in successes if line[unit] == name])
-                for name in names
-            }
+            of_units = summaries(successes, "number" if group == "orange" else "band")
             result.setdefault(f"{group}, {pull}", {})[method] = {
                 "together": together(of_units),
                 "recordings": len(successes),

@@ -41,7 +41,7 @@ from validation.campaigns.rig_scores import (
     saved,
     scored,
     sling_of,
-    summary,
+    summaries,
 )
 from validation.campaigns.runner import OURS, PAPER, job_of, read
 from validation.density import Calibrated, calibrated_by
@@ -176,10 +176,7 @@ def figures(lines: list[dict]) -> dict:
         good = [line for line in some if "failed" not in line]
         if not good:
             continue
-        of_bands = {
-            name: summary([line["scores"] for line in good if line["band"] == name])
-            for name in dict.fromkeys(line["band"] for line in good)
-        }
+        of_bands = summaries(good, "band")
         result[kind] = {
             "together": together(of_bands),
             "settled": [sum(bool(line["told"]["settled"]) for line in good), len(good)],

@@ -9,15 +9,13 @@ import numpy as np
 from pipeline.simulator import launch
 from pipeline.simulator.model import GRAVITY
 from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.records import Grip
 from validation.simulator import figures
 from validation.simulator.closed import String, cantilever, clamped_beam
 from validation.simulator.experiment import (
     TIGHT,
     band_of,
-    move,
+    held_straight,
     rest,
-    settling,
     setup_of,
     straight,
     straight_guess,
@@ -47,25 +45,12 @@ def straight_pull(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Measured and closed-form pull (N,) of a straight band whose other half is at its rest length.
 
-    The fingers hold the middle; the first half is stretched, so that the hand feels it alone.
-
     Args:
         thinner: How many times thinner the band is than its own diameter.
     """
     sling = band_of(bench)
     sling = replace(sling, radius=sling.radius / thinner)
-    half = sling.rest_length / 2
-    sling = straight(sling, (stretch + 1) * half)
-    target = (stretch * half - sling.half_width, 0.0, 0.0)
-    start = straight_guess(sling, stretch * half)
-    motion = move(
-        bench,
-        sling,
-        Parameters.of(sling.law, theta),
-        settling(Grip.HELD, target),
-        start,
-        gravity=0.0,
-    )
+    sling, motion = held_straight(bench, sling, stretch, Parameters.of(sling.law, theta))
     measured = np.where(motion.failed, np.nan, -motion.force[:, -1, 0])
     return measured, np.array([float(String.of(sling, row).force(stretch)) for row in theta])
 
@@ -76,9 +61,7 @@ def drawn_pull(bench: Bench, depth: float, theta: np.ndarray) -> tuple[np.ndarra
     half = np.hypot(depth, sling.half_width)
     stretch = 2 * half / sling.rest_length
     parameters = Parameters.of(sling.law, theta)
-    done = launch(
-        sling, setup, parameters, [-depth, 0.0], device=bench.device, workers=bench.workers
-    )
+    done = launch(sling, setup, parameters, [-depth, 0.0], **bench.on)
     strings = [String.of(sling, row) for row in theta]
     expected = [2 * float(string.force(stretch)) * depth / half for string in strings]
     return done.hold_force, np.array(expected)

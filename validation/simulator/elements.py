@@ -25,7 +25,7 @@ from validation.benchmarks.timing import timed
 from validation.marked import row
 from validation.reports import plain
 from validation.simulator.closed import String, clamped_beam
-from validation.simulator.experiment import setup_of
+from validation.simulator.experiment import setup_of, straight
 from validation.simulator.finding import Bench, Theme
 from validation.simulator.launching import random_launches
 from validation.synthetic import pull_and_release
@@ -93,12 +93,7 @@ def slings(params) -> dict[str, ClampedBand]:
 
 def bending(sling: ClampedBand, poissons=POISSON) -> np.ndarray:
     """Stiffness of a light beam clamped at both ends over Euler-Bernoulli's; NaN if it fails."""
-    beam = replace(
-        sling,
-        half_width=sling.rest_length / 2,
-        clamp_direction=np.array([1.0, 0.0, 0.0]),
-        mass=sling.mass / 200,
-    )
+    beam = straight(sling, sling.rest_length, mass=sling.mass / 200)
     young = 1e7
     nodes = np.zeros((beam.sections, 3))
     nodes[:, 0] = beam.arc - beam.half_width

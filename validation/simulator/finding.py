@@ -74,6 +74,11 @@ class Bench:
     workers: int = 1
     figures: Path | None = None
 
+    @property
+    def on(self) -> dict:
+        """Where simulations run, as options of theirs."""
+        return {"device": self.device, "workers": self.workers}
+
 
 def off(value, expected) -> float:
     """Largest deviation from `expected` in percent of it; NaN where a value is none."""

@@ -52,13 +52,9 @@ def ease(t: np.ndarray, first: float, last: float) -> np.ndarray:
 
 
 def unseen(
-    band: str,
-    time: np.ndarray,
-    position: np.ndarray,
-    cloud_time: np.ndarray,
-    grasp_time: float,
+    band: str, time: np.ndarray, position: np.ndarray, cloud_time: np.ndarray, grasp_time: float,
     release_time: float,
-) -> Episode:
+) -> Episode:  # fmt: skip
     """A motion of the hand (T,), (T, 3) whose force and clouds nobody measured."""
     return Episode(
         band=band,
@@ -102,15 +98,9 @@ def _ridge(line: np.ndarray, radius: float, camera: np.ndarray, count: int) -> n
 
 
 def own_law_episode(
-    sling: ClampedBand,
-    episode: Episode,
-    theta: Parameters,
-    *,
-    cutoff: float,
-    force_noise: float = 0.05,
-    depth_noise: float = 0.0006,
-    seed: int = 0,
-) -> Episode:
+    sling: ClampedBand, episode: Episode, theta: Parameters, *, cutoff: float,
+    force_noise: float = 0.05, depth_noise: float = 0.0006, seed: int = 0,
+) -> Episode:  # fmt: skip
     """What would have been recorded, had the band of this episode the simulator's law and theta.
 
     Args:
@@ -137,13 +127,9 @@ def own_law_episode(
 
 
 def visible(
-    line: np.ndarray,
-    sizes: np.ndarray,
-    radius: float,
-    camera: np.ndarray,
-    noise: float,
+    line: np.ndarray, sizes: np.ndarray, radius: float, camera: np.ndarray, noise: float,
     rng: np.random.Generator,
-) -> np.ndarray:
+) -> np.ndarray:  # fmt: skip
     """Points of the side of an incompressible tube that faces the camera, shape (P, 3), float32.
 
     Args:

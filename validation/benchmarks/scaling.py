@@ -31,12 +31,9 @@ LAUNCHES = (1024, 16384)
 
 
 def bench_scaling(
-    params: Params,
-    device: str,
-    band: str | None = None,
-    method: str = "sling2sim2real",
+    params: Params, device: str, band: str | None = None, method: str = "sling2sim2real",
     size: str = "laptop",
-) -> dict:
+) -> dict:  # fmt: skip
     """Time it on the first of some devices, on two, four, ... and on all.
 
     Args:

@@ -28,7 +28,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import commit
-from validation.benchmarks.command import disk, measured
+from validation.benchmarks.timing import disk, measured
 from validation.campaigns.runner import read
 from validation.marked import fill, marks
 from validation.reports import write_report

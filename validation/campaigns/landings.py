@@ -60,6 +60,7 @@ OTHERWISE: tuple[tuple[str, dict], ...] = (  # how the first recording of a band
     ("paper", {"method": PAPER}),
 )
 LINE = 125  # characters, of README.md
+TOLD = "parameters", "derived", "settled", "steps"  # what is kept of a confidence
 BANDS, TEN = ("band1", "band2", "band3"), 10
 BOOTSTRAP = 2000
 
@@ -145,12 +146,9 @@ def identified(job: OneRecording, work: Path, keep: bool = False) -> dict:
         scores = scored(outcome, params, world, seed=job.number)
     if not keep:
         shutil.rmtree(folder)
-    reported = {
-        name: confidence.get(name) for name in ("parameters", "derived", "settled", "steps")
-    }
     return {
         "scores": scores,
-        "told": reported,
+        "told": {name: confidence.get(name) for name in TOLD},
         "delays": episode.metadata["preprocessing"].get("delays"),
         "identification_s": seconds,
         "cpu_s": time.process_time() - begin,
@@ -173,18 +171,14 @@ def figures(lines: list[dict]) -> dict:
     for line in lines:
         kinds.setdefault(job_of(line, OneRecording).kind, []).append(line)
     for kind, some in sorted(kinds.items()):
-        good = [line for line in some if "failed" not in line]
+        good, bad = ([one for one in some if ("failed" in one) == lost] for lost in (False, True))
         if not good:
             continue
         of_bands = summaries(good, "band")
         result[kind] = {
             "together": together(of_bands),
             "settled": [sum(bool(line["told"]["settled"]) for line in good), len(good)],
-            "refused": {
-                f"{line['band']} {line['number']}": line["failed"]
-                for line in some
-                if "failed" in line
-            },
+            "refused": {f"{one['band']} {one['number']}": one["failed"] for one in bad},
             "bands": of_bands,
         }
     return plain(result)

@@ -80,26 +80,22 @@ def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> li
         )
         for stretch in stretches
     ]  # fmt: skip
-    checks.append(
-        Measure(
-            f"pull of the band itself at stretch {stretches[0]:g}, worst of E and ν", against,
-            off(*straight_pull(bench, stretches[0], theta)), "%", None,
-            "of its full thickness; clamp and fingers keep their sections from thinning, which"
-            " stiffens it: no string",
-        )
-    )  # fmt: skip
+    checks.append(Measure(
+        f"pull of the band itself at stretch {stretches[0]:g}, worst of E and ν", against,
+        off(*straight_pull(bench, stretches[0], theta)), "%", None,
+        "of its full thickness; clamp and fingers keep their sections from thinning, which"
+        " stiffens it: no string",
+    ))  # fmt: skip
     width, length = band_of(bench).half_width, band_of(bench).rest_length
     for stretch in DRAWN:
         depth = np.sqrt((stretch * length / 2) ** 2 - width**2)
-        checks.append(
-            Measure(
-                f"hold force of a draw of {depth:.2f} m (stretch {stretch:g}), worst of E and ν",
-                f"two straight strings, {against}",
-                off(*drawn_pull(bench, depth, theta)), "%", PULL_LIMIT if stretch > SOFT else None,
-                "as `launch` gives it, single precision; bending at tips and pouch"
-                + (" hardly counts" if stretch > SOFT else " counts, and is no string's"),
-            )
-        )  # fmt: skip
+        checks.append(Measure(
+            f"hold force of a draw of {depth:.2f} m (stretch {stretch:g}), worst of E and ν",
+            f"two straight strings, {against}",
+            off(*drawn_pull(bench, depth, theta)), "%", PULL_LIMIT if stretch > SOFT else None,
+            "as `launch` gives it, single precision; bending at tips and pouch"
+            + (" hardly counts" if stretch > SOFT else " counts, and is no string's"),
+        ))  # fmt: skip
     return checks
 
 
@@ -177,19 +173,15 @@ def torsion(bench: Bench, poissons=BEAM_POISSON) -> list[Measure]:
     for poisson in poissons:
         ratio = torque_ratio(bench, 0.1, poisson)
         note = f"{ratio:.4f} of it"
-        checks.append(
-            Measure(
-                f"torque at a twist of 0.1 rad, ν {poisson:.2f}", against,
-                off(ratio, 1.0), "%", TORSION_LIMIT, note,
-            )
-        )  # fmt: skip
+        checks.append(Measure(
+            f"torque at a twist of 0.1 rad, ν {poisson:.2f}", against,
+            off(ratio, 1.0), "%", TORSION_LIMIT, note,
+        ))  # fmt: skip
     ratio = torque_ratio(bench, np.pi, 0.45)
-    checks.append(
-        Measure(
-            "torque at half a turn, ν 0.45", against, off(ratio, 1.0), "%", None,
-            f"{ratio:.4f} of it; the small-twist form need not hold there",
-        )
-    )  # fmt: skip
+    checks.append(Measure(
+        "torque at half a turn, ν 0.45", against, off(ratio, 1.0), "%", None,
+        f"{ratio:.4f} of it; the small-twist form need not hold there",
+    ))  # fmt: skip
     return checks
 
 

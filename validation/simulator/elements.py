@@ -23,7 +23,6 @@ from pipeline.simulator.schedule import Schedule, statics
 from pipeline.simulator.solver import Options, Slings, memory, run
 from validation.benchmarks.timing import timed
 from validation.marked import row
-from validation.reports import plain
 from validation.simulator.closed import String, clamped_beam
 from validation.simulator.experiment import setup_of, straight
 from validation.simulator.finding import Bench, Theme
@@ -223,17 +222,4 @@ def _milliseconds(seconds: float, of_rod: float) -> str:
 def section(bench: Bench) -> Theme:
     """Compare the rod with tetrahedra on the CPU, whatever the other checks run on."""
     columns = {name: measure(bench, sling) for name, sling in slings(bench.params).items()}
-    rod = next(iter(columns.values()))
-    details = {
-        name: {
-            "pull_over_string": plain(column.pull, 5),
-            "bending_over_euler_bernoulli": plain(column.bending, 5),
-            "against_the_rod": plain(compare(column, rod), 5),
-            "cpu_s_a_rollout": column.rollout_seconds,
-            "cpu_s_a_launch": column.launch_seconds,
-            "bytes_a_rollout": column.memory,
-            "failed": failures(column),
-        }
-        for name, column in columns.items()
-    }
-    return Theme("Rod and tetrahedra", [], TEXT + table(columns), details=details)
+    return Theme("Rod and tetrahedra", [], TEXT + table(columns))

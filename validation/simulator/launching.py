@@ -67,14 +67,9 @@ def differences(default: Launches, finer: Launches) -> dict[str, float]:
 
 
 def convergence(
-    bench: Bench,
-    count: int = COUNT,
-    meshes=(2, 4),
-    progress=print,
-    sling: ClampedBand | None = None,
-    history: LaunchHistory | None = None,
-    **others: float,
-) -> list[Measure]:
+    bench: Bench, count: int = COUNT, meshes=(2, 4), progress=print,
+    sling: ClampedBand | None = None, history: LaunchHistory | None = None, **others: float,
+) -> list[Measure]:  # fmt: skip
     sling, (thetas, draws) = sling or band_of(bench), random_launches(count)
     setup = setup_of(bench, history=history)
     thetas = Parameters.of(sling.law, thetas, **others)
@@ -99,11 +94,9 @@ def convergence(
         if name in stated:
             note += f"; stated: past the {meshes[0]} times finer mesh that the limit is for"
         limit = None if name in stated else LIMIT
-        checks.append(
-            Measure(
-                f"launch speed, worst of {count} random θ", name, far["speed"], "%", limit, note
-            )
-        )
+        checks.append(Measure(
+            f"launch speed, worst of {count} random θ", name, far["speed"], "%", limit, note
+        ))  # fmt: skip
     return checks
 
 

@@ -66,13 +66,9 @@ CAMPAIGNS = {
 
 
 def verify(
-    params,
-    device: str = "cpu",
-    progress: Callable[[str], None] = print,
-    *,
-    extra: dict[str, Callable[[Bench], Theme]] | None = None,
-    root: Path = Path("."),
-) -> list[Theme]:
+    params, device: str = "cpu", progress: Callable[[str], None] = print, *,
+    extra: dict[str, Callable[[Bench], Theme]] | None = None, root: Path = Path("."),
+) -> list[Theme]:  # fmt: skip
     """Run every check and write the report.
 
     Args:

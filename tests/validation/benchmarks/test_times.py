@@ -11,8 +11,8 @@ from app.cli import parser
 from pipeline.base.errors import UserError
 from tests.project import ROOT
 from validation.benchmarks import times as bench
-from validation.benchmarks.command import disk, measured
 from validation.benchmarks.times import BEGIN, END, MeasuredStep
+from validation.benchmarks.timing import disk, measured
 from validation.marked import with_block
 
 HUNDRED_MB = "import time; held = b'1' * 100_000_000; time.sleep({seconds})"

@@ -95,13 +95,9 @@ def ended(copy: StruckCopy, expected: dict) -> dict[str, bool]:
 
 
 def disturb(
-    copy: StruckCopy,
-    by: str,
-    wanted: int,
-    lines: ResultLines,
-    expected: dict,
+    copy: StruckCopy, by: str, wanted: int, lines: ResultLines, expected: dict,
     attempt: Callable[[int, int], dict],
-) -> None:
+) -> None:  # fmt: skip
     """Disturb a command so often, and let it end well then."""
     name, going = copy.name, False
     while True:

@@ -194,5 +194,5 @@ def results_of(
 def expect(results: Sequence[Job], work: Path) -> Sequence[Job]:
     """Some results, of which there is one at least. Raises UserError."""
     if not results:
-        raise UserError(f"{work}: holds no result of these jobs; give it more --minutes")
+        raise UserError(f"{work}: holds no result of these jobs yet")
     return results

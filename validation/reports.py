@@ -32,9 +32,9 @@ def write_report(
     """
     script = Path(sys._getframe(1).f_code.co_filename).resolve()
     module = ".".join(script.relative_to(ROOT).with_suffix("").parts).removesuffix(".__main__")
-    about = environment(device, f"python -m {module} {arguments}".rstrip(), script)
-    about["versions"] |= versions or {}
-    report = about | plain(content, digits)
+    provenance = environment(device, f"python -m {module} {arguments}".rstrip(), script)
+    provenance["versions"] |= versions or {}
+    report = provenance | plain(content, digits)
     write_json(path, report)
     return report
 

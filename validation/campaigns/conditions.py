@@ -341,8 +341,8 @@ def main() -> int:
         wanted = cell not in there or there[cell]["faults"]
         if wanted and not given.report_only and time.monotonic() < end:
             lines.add(result := run(cell, work))
-            said = result["faults"] or "as expected"
-            print(f"{cell.condition}: {cell.command}: {said}", flush=True)
+            outcome = result["faults"] or "as expected"
+            print(f"{cell.condition}: {cell.command}: {outcome}", flush=True)
 
     with ThreadPoolExecutor(given.workers) as pool:
         for _ in pool.map(run_cell, cells):  # raises what a cell raises

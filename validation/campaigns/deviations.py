@@ -166,7 +166,7 @@ def prepare(where: tuple[str, int], work: Path, recordings: Path | None) -> None
     for switch, folder in folders.items():
         params = params_of(band, switch)
         how = params.cloud, params.force
-        episode = next((one for settings, one in built if settings == how), None)
+        episode = next((made for settings, made in built if settings == how), None)
         if episode is None:
             episode = build_episodes(raw, band, params)[0][0]
             built.append((how, episode))
@@ -182,16 +182,16 @@ def prepare(where: tuple[str, int], work: Path, recordings: Path | None) -> None
 def scored(case: Case, work: Path, recordings: Path | None) -> dict:
     """What one identification found, and how near its forces and launches are."""
     params = params_of(case.band, case.switch)
-    found = identified(params, case.band, case.method, case.seed, case.episode(work))
+    identification = identified(params, case.band, case.method, case.seed, case.episode(work))
     seen = Episode.load(case.episode(work, AS_IS) / "episode")
     return {
-        "theta": found.theta,
-        "youngs_modulus": found.theta["youngs_modulus"],
-        "seconds": found.seconds,
-        "point": [*found.outcome.identified.values()],
-        "own_loss": found.confidence.get("loss", {}).get("total"),
-        **forces(case.band, found.outcome, seen),
-        **misses(case.band, found.outcome, seen, recordings),
+        "theta": identification.theta,
+        "youngs_modulus": identification.theta["youngs_modulus"],
+        "seconds": identification.seconds,
+        "point": [*identification.outcome.identified.values()],
+        "own_loss": identification.confidence.get("loss", {}).get("total"),
+        **forces(case.band, identification.outcome, seen),
+        **misses(case.band, identification.outcome, seen, recordings),
     }
 
 

@@ -100,8 +100,8 @@ def checked(path: Path, recording: str) -> tuple[list[dict], s2s.Episode | None]
         text = str(error).removeprefix(f"{path}: ")
         return [{"about": "", "concern": "", "what": text, "refused": True}], None
     findings = [
-        {"about": one.about, "concern": concern[one.about], "what": one.what, "refused": False}
-        for one in done.findings
+        {"about": name, "concern": concern[name], "what": what, "refused": False}
+        for name, what in ((finding.about, finding.what) for finding in done.findings)
     ]
     return findings, episode_of(done, band, params)
 

@@ -171,14 +171,16 @@ def figures(lines: list[dict]) -> dict:
     for line in lines:
         kinds.setdefault(job_of(line, OneRecording).kind, []).append(line)
     for kind, some in sorted(kinds.items()):
-        good, bad = ([one for one in some if ("failed" in one) == lost] for lost in (False, True))
+        good, bad = (
+            [line for line in some if ("failed" in line) is lost] for lost in (False, True)
+        )
         if not good:
             continue
         of_bands = summaries(good, "band")
         result[kind] = {
             "together": together(of_bands),
             "settled": [sum(bool(line["told"]["settled"]) for line in good), len(good)],
-            "refused": {f"{one['band']} {one['number']}": one["failed"] for one in bad},
+            "refused": {f"{line['band']} {line['number']}": line["failed"] for line in bad},
             "bands": of_bands,
         }
     return plain(result)

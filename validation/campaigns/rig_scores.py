@@ -181,17 +181,17 @@ def summary(results: list[dict]) -> dict:
         np.array([result[name] for result in results], float)
         for name in ("error", "miss", "low", "high")
     )
-    known = np.isfinite(low) & np.isfinite(miss)
-    inside = np.array([result["inside"] for result in results])[known]
-    width = ((high - low) / targets)[known]
+    finite = np.isfinite(low) & np.isfinite(miss)
+    inside = np.array([result["inside"] for result in results])[finite]
+    width = ((high - low) / targets)[finite]
     return {
         "bias": np.nanmean(error, axis=1),
         "mean_bias": np.nanmean(error),
         "mean_miss_m": np.nanmean(np.abs(miss)),
         "failed": int(np.isnan(error).sum()),
-        "coverage": inside.mean() if known.any() else np.nan,
-        "launches": int(known.sum()),
-        "median_width": np.nanmedian(width) if known.any() else np.nan,
+        "coverage": inside.mean() if finite.any() else np.nan,
+        "launches": int(finite.sum()),
+        "median_width": np.nanmedian(width) if finite.any() else np.nan,
     }
 
 

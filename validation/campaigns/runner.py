@@ -154,8 +154,8 @@ def parser(
         orange: With --orange, the folder of recordings that this project did not make.
     """
     options = argparse.ArgumentParser(description=(doc or "").partition("\n")[0])
-    told = f"file (default: {report or 'by what is asked for'})"
-    options.add_argument("--report", type=Path, default=report, help=told)
+    default = f"file (default: {report or 'by what is asked for'})"
+    options.add_argument("--report", type=Path, default=report, help=default)
     if work is not None:
         options.add_argument("--work", type=Path, default=work, help=f"folder (default: {work})")
     if work is not None and many:

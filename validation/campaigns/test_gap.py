@@ -164,12 +164,12 @@ def band_figures(params: Params, run: ProjectCopy, band: str, progress) -> dict:
         result = {"floor": floor, "methods": {}}
         for method in METHODS:
             result["methods"][method] = of = split(params, run, world, (tried, landing), method)
-            message = [
+            errors = [
                 f"{name} {100 * v['mean_error_m']:.2f} ({100 * v['without_noise_m']:.2f})"
                 for name, v in of["variants"].items()
             ]
-            said = f"{', '.join(message)}; {of['limits']}"
-            progress(f"  {band} {method} [cm] (without noise): {said}")
+            message = f"{', '.join(errors)}; {of['limits']}"
+            progress(f"  {band} {method} [cm] (without noise): {message}")
     return result
 
 

@@ -24,7 +24,9 @@ def contents(folder: Path) -> dict[str, str]:
     """
     digests = {}
     for at, folders, names in os.walk(folder):
-        folders[:] = [one for one in folders if one not in PASSING and not one.endswith(".tmp")]
+        folders[:] = [
+            inner for inner in folders if inner not in PASSING and not inner.endswith(".tmp")
+        ]
         for name in names:
             if name not in ELSEWHERE and not name.endswith(".tmp"):
                 file = Path(at, name)

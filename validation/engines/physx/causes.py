@@ -159,7 +159,7 @@ def main() -> None:
         "band": name,
         "variants": rows,
     }
-    about = {"device": "cuda:0", "versions": {"ovphysx": version}}
+    options = {"device": "cuda:0", "versions": {"ovphysx": version}}
     with Engine() as engine:
         for variant, change in VARIANTS.items():
             stage = change(Variant(text, band))
@@ -171,7 +171,7 @@ def main() -> None:
                 f" {volume:.0f} % of the volume",
                 flush=True,
             )
-            write_report(REPORT, content, "USD YAML", **about)
+            write_report(REPORT, content, "USD YAML", **options)
 
 
 if __name__ == "__main__":

@@ -150,7 +150,7 @@ def main() -> None:
     requested = parser.parse_args()
     params, version = load(requested.params), release()
     arguments = requested.band + (" --landings CSV" if requested.landings else "")
-    about = {"device": devices()[0], "versions": {"ovphysx": version}}
+    options = {"device": devices()[0], "versions": {"ovphysx": version}}
     if requested.landings:
         table = pd.read_csv(requested.landings)
         draws, measured = table[["draw_y_m", "draw_z_m"]].to_numpy(), table.landing_y_m
@@ -178,7 +178,7 @@ def main() -> None:
         "launches_in_our_simulator": comparison.launches(np.array(thetas), draws, measured),
     }
     path = Path("reports/validation") / f"physx-{requested.band}.json"
-    write_report(path, content, arguments, **about)
+    write_report(path, content, arguments, **options)
     done, failures = {}, {}
     for where, rate in ((OURS, RATE), (PHYSX, RATE), (f"{PHYSX}_{FINE}_hz", FINE)):
         try:
@@ -190,7 +190,7 @@ def main() -> None:
             "failed_engines": failures,
             "draws": side_by_side(done, draws, measured),
         }
-        write_report(path, content, arguments, **about)
+        write_report(path, content, arguments, **options)
 
 
 if __name__ == "__main__":

@@ -54,9 +54,13 @@ class Calibrated:
 
 
 def calibrated_by(
-    params, method: str, sling: ClampedBand, episodes: Sequence[Episode],
-    observed: Sequence[Observed] = (), devices: Sequence[str] = ("cpu",),
-) -> tuple[Calibrated, dict]:  # fmt: skip
+    params,
+    method: str,
+    sling: ClampedBand,
+    episodes: Sequence[Episode],
+    observed: Sequence[Observed] = (),
+    devices: Sequence[str] = ("cpu",),
+) -> tuple[Calibrated, dict]:
     """What a method finds, and says of it: least squares takes all, others the first.
 
     Searches have their rollouts on `devices`, the fit of least squares on the CPU.

@@ -14,9 +14,14 @@ from pipeline.base.files import write_json
 
 
 def write_report(
-    path: Path, content: Mapping, arguments: str = "", *, device: str = "cpu",
-    versions: Mapping[str, str] | None = None, digits: int | None = None,
-) -> dict:  # fmt: skip
+    path: Path,
+    content: Mapping,
+    arguments: str = "",
+    *,
+    device: str = "cpu",
+    versions: Mapping[str, str] | None = None,
+    digits: int | None = None,
+) -> dict:
     """Write what a script has found, and what it belongs to.
 
     Args:

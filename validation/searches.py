@@ -23,10 +23,21 @@ class PlainStarts:
     """
 
     def __init__(
-        self, dimension: int, *, rollouts: int, seed: int, population: int, generations: int,
-        k_top: int, delta: float, cma_population: int, mutation_low: float = 0.5,
-        mutation_high: float = 1.0, recombination: float = 0.7, deviation: float = 0.25,
-    ) -> None:  # fmt: skip
+        self,
+        dimension: int,
+        *,
+        rollouts: int,
+        seed: int,
+        population: int,
+        generations: int,
+        k_top: int,
+        delta: float,
+        cma_population: int,
+        mutation_low: float = 0.5,
+        mutation_high: float = 1.0,
+        recombination: float = 0.7,
+        deviation: float = 0.25,
+    ) -> None:
         """Settings as params.yaml's `optimizer` has them; the deviation in edges of the cube."""
         explore = population * (generations + 1)
         self._stage = Evolution(
@@ -93,9 +104,15 @@ class PlainAdam:
     phase = "adam"
 
     def __init__(
-        self, dimension: int, *, rollouts: int, seed: int, population: int, rate: float = 0.05,
+        self,
+        dimension: int,
+        *,
+        rollouts: int,
+        seed: int,
+        population: int,
+        rate: float = 0.05,
         step: float = 0.003,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Rate and step in edges of the cube; `rollouts` and `population` are not used."""
         import torch
 

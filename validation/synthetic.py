@@ -52,9 +52,13 @@ def ease(t: np.ndarray, first: float, last: float) -> np.ndarray:
 
 
 def unseen(
-    band: str, time: np.ndarray, position: np.ndarray, cloud_time: np.ndarray, grasp_time: float,
+    band: str,
+    time: np.ndarray,
+    position: np.ndarray,
+    cloud_time: np.ndarray,
+    grasp_time: float,
     release_time: float,
-) -> Episode:  # fmt: skip
+) -> Episode:
     """A motion of the hand (T,), (T, 3) whose force and clouds nobody measured."""
     return Episode(
         band=band,
@@ -98,9 +102,15 @@ def _ridge(line: np.ndarray, radius: float, camera: np.ndarray, count: int) -> n
 
 
 def own_law_episode(
-    sling: ClampedBand, episode: Episode, theta: Parameters, *, cutoff: float,
-    force_noise: float = 0.05, depth_noise: float = 0.0006, seed: int = 0,
-) -> Episode:  # fmt: skip
+    sling: ClampedBand,
+    episode: Episode,
+    theta: Parameters,
+    *,
+    cutoff: float,
+    force_noise: float = 0.05,
+    depth_noise: float = 0.0006,
+    seed: int = 0,
+) -> Episode:
     """What would have been recorded, had the band of this episode the simulator's law and theta.
 
     Args:
@@ -127,9 +137,13 @@ def own_law_episode(
 
 
 def visible(
-    line: np.ndarray, sizes: np.ndarray, radius: float, camera: np.ndarray, noise: float,
+    line: np.ndarray,
+    sizes: np.ndarray,
+    radius: float,
+    camera: np.ndarray,
+    noise: float,
     rng: np.random.Generator,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Points of the side of an incompressible tube that faces the camera, shape (P, 3), float32.
 
     Args:

@@ -87,9 +87,13 @@ def bench_methods(
 
 
 def time_search(
-    params: Params, method: str, optimizer: OptimizerParams, sling: ClampedBand, episode: Episode,
+    params: Params,
+    method: str,
+    optimizer: OptimizerParams,
+    sling: ClampedBand,
+    episode: Episode,
     devices: Sequence[str],
-) -> tuple[dict, History]:  # fmt: skip
+) -> tuple[dict, History]:
     """One search from nothing, all its rollouts counted; and what it evaluated."""
     params = params.model_copy(update={"optimizer": optimizer})
     method_params = params.methods[method]
@@ -127,9 +131,13 @@ def time_search(
 
 
 def _generation(
-    params: Params, sling: ClampedBand, episode: Episode, method: str, devices: Sequence[str],
+    params: Params,
+    sling: ClampedBand,
+    episode: Episode,
+    method: str,
+    devices: Sequence[str],
     count: int,
-) -> dict:  # fmt: skip
+) -> dict:
     """Seconds of one generation: simulated, and with the loss, on all cores or GPUs."""
     evaluate = evaluator(params, method, sling, episode, devices)
     unit = latin_hypercube(evaluate.box.dimension, count, params.optimizer.seed)

@@ -31,9 +31,12 @@ LAUNCHES = (1024, 16384)
 
 
 def bench_scaling(
-    params: Params, device: str, band: str | None = None, method: str = "sling2sim2real",
+    params: Params,
+    device: str,
+    band: str | None = None,
+    method: str = "sling2sim2real",
     size: str = "laptop",
-) -> dict:  # fmt: skip
+) -> dict:
     """Time it on the first of some devices, on two, four, ... and on all.
 
     Args:

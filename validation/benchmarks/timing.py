@@ -80,9 +80,14 @@ def measured(
     start, peak, seen = time.perf_counter(), 0, []
     with log.open("wb") as file:
         process = psutil.Popen(
-            words, cwd=cwd, env=surroundings, stdin=subprocess.DEVNULL, stdout=file,
-            stderr=subprocess.STDOUT, start_new_session=True,
-        )  # fmt: skip
+            words,
+            cwd=cwd,
+            env=surroundings,
+            stdin=subprocess.DEVNULL,
+            stdout=file,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
         status = None
         try:
             while status is None:

@@ -65,9 +65,12 @@ def shares(count: int, done: set[tuple]) -> list[tuple[str, str, int, int]]:
 
 
 def run(
-    folder: Path, parts: list[tuple], workers: int, on_result: Callable[[Result], None],
+    folder: Path,
+    parts: list[tuple],
+    workers: int,
+    on_result: Callable[[Result], None],
     end: float = math.inf,
-) -> None:  # fmt: skip
+) -> None:
     """Run shares, each in a process of its own, and tell of each recording.
 
     Args:

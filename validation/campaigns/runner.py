@@ -108,9 +108,13 @@ def each(
 
 
 def run(
-    work: Callable[[Job], Mapping], jobs: Sequence[Job], results: ResultLines, workers: int,
-    minutes: float = 1e4, **more: object,
-) -> None:  # fmt: skip
+    work: Callable[[Job], Mapping],
+    jobs: Sequence[Job],
+    results: ResultLines,
+    workers: int,
+    minutes: float = 1e4,
+    **more: object,
+) -> None:
     """Add results of jobs that have none yet, with `more` in each, until the time is over."""
     there = results.of(type(jobs[0])) if jobs else {}
     todo = [job for job in jobs if job not in there]
@@ -140,9 +144,14 @@ def read(path: Path):
 
 
 def parser(
-    doc: str | None, report: Path | None, work: Path | None = None, *,
-    many: bool = True, page: Path | None = None, orange: bool = False,
-) -> argparse.ArgumentParser:  # fmt: skip
+    doc: str | None,
+    report: Path | None,
+    work: Path | None = None,
+    *,
+    many: bool = True,
+    page: Path | None = None,
+    orange: bool = False,
+) -> argparse.ArgumentParser:
     """A campaign's arguments.
 
     Args:

@@ -17,9 +17,20 @@ from validation.campaigns.runner import OURS, PAPER
 
 PRESETS = ROOT / "presets"
 LAST = "plain_bo"  # takes as long as all others
-# The paper's method under other settings: what the paper's source has commented out.
-SETTINGS: dict[str, dict] = {"late": {"loss": {"late_decay": 0.5}}}
-QUARTER = Weights(geom=0.25, force=1.0, work=1.0)  # geometry's part is most of the loss
+# The paper's method under other settings, by names of their own. Of the weights, geometry's is most
+# of the loss; late: what the paper's source has commented out.
+SETTINGS: dict[str, dict] = {
+    "late": {"loss": {"late_decay": 0.5}},
+    "cma_8": {"optimizer": {"cma_population": 8}},
+    "cma_32": {"optimizer": {"cma_population": 32}},
+    "de_storn": {"optimizer": {"mutation": [0.7, 0.9], "recombination": 0.9}},
+    "de_half": {"optimizer": {"mutation": [0.4, 0.6], "recombination": 0.9}},
+}
+WEIGHTS = {
+    "geom_quarter": {"geom": 0.25, "force": 1.0, "work": 1.0},
+    "force_fourfold": {"geom": 1.0, "force": 4.0, "work": 1.0},
+    "work_fourfold": {"geom": 1.0, "force": 1.0, "work": 4.0},
+}
 # The density with its priors' standard deviations times a factor, and the loss factor's mean too.
 PRIOR_CHANGES = {
     "prior_half": (0.5, 1.0),
@@ -28,10 +39,12 @@ PRIOR_CHANGES = {
     "prior_loss_down": (1.0, 0.6),
 }
 LAW_CHANGES = "search_rubber", "density_neo_hookean", "no_softening"
-BESIDE = {*SETTINGS, "geom_quarter", *PRIOR_CHANGES, *LAW_CHANGES}  # what no campaign runs unasked
+BESIDE = {*SETTINGS, *WEIGHTS, *PRIOR_CHANGES, *LAW_CHANGES}  # what no campaign runs unasked
 # Gaussian processes of thousands of points cost more than the simulations: a large budget is less.
-BAYES = "bo", "package_si"
-BAYES_LARGE = {"population": 20, "generations": 8, "cma_rollouts": 2220}
+BAYES, BAYES_LARGE = (
+    ("bo", "package_si"),
+    {"population": 20, "generations": 8, "cma_rollouts": 2220},
+)
 
 
 def with_variants(params: Params) -> Params:
@@ -52,13 +65,17 @@ def with_variants(params: Params) -> Params:
         LAST: variant("SmallBatches"),
         "plain_adam": variant("PlainAdam"),
         "no_clamp_calibration": paper.model_copy(update={"mounting": False}),
-        "geom_quarter": paper.model_copy(update={"weights": QUARTER}),
     }
+    for name, weights in WEIGHTS.items():
+        methods[name] = paper.model_copy(update={"weights": Weights(**weights)})
+    methods |= dict.fromkeys(SETTINGS, paper)
     density = params.methods[OURS]
-    methods |= dict.fromkeys(SETTINGS, paper) | dict.fromkeys(PRIOR_CHANGES, density)
-    rubber, plain = ({"law": method.law, "bounds": method.bounds} for method in (density, paper))
+    methods |= dict.fromkeys(PRIOR_CHANGES, density)
+    rubber, plain = (
+        {"law": method.law, "bounds": method.bounds} for method in (density, methods[PAPER])
+    )
     methods |= {
-        "search_rubber": paper.model_copy(update=rubber),
+        "search_rubber": methods[PAPER].model_copy(update=rubber),
         "density_neo_hookean": density.model_copy(update=plain),
         "no_softening": density.model_copy(update={"fixed": {**density.fixed, "softening": 0.0}}),
     }

@@ -126,17 +126,23 @@ def pull_checks(result: EnginePull, title: str, fine: bool) -> list[Measure]:
     frame = int(worst.argmax())
     return [
         Measure(
-            f"force on the hand while held, of its peak, {title}", "MuJoCo 3D flex",
-            result.force_error, "%", 2.0 if fine else None,
+            f"force on the hand while held, of its peak, {title}",
+            "MuJoCo 3D flex",
+            result.force_error,
+            "%",
+            2.0 if fine else None,
             f"{result.held_error:+.2f} % at the end of the hold"
             + ("" if fine else "; its section is too coarse to bend freely"),
         ),
         Measure(
-            f"centre line while held, rms, {title}", "MuJoCo 3D flex",
-            float(np.sqrt((worst**2).mean())), "mm", 5.0 if fine else None,
+            f"centre line while held, rms, {title}",
+            "MuJoCo 3D flex",
+            float(np.sqrt((worst**2).mean())),
+            "mm",
+            5.0 if fine else None,
             f"at most {worst[frame]:.1f} mm in a frame, at {result.frames[frame]:.2f} s",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def launch_check(
@@ -155,11 +161,14 @@ def launch_check(
     speed = 100 * (np.array([flight.speed for flight in theirs]) / ours.speed - 1)
     hold = 100 * (np.array([flight.hold_force for flight in theirs]) / ours.hold_force - 1)
     return Measure(
-        f"landing of {len(cases)} launches, the largest difference{title}", "MuJoCo 3D flex",
-        float(np.abs(landing).max()), "%", 3.0,
+        f"landing of {len(cases)} launches, the largest difference{title}",
+        "MuJoCo 3D flex",
+        float(np.abs(landing).max()),
+        "%",
+        3.0,
         f"landings {', '.join(f'{x:+.1f}' for x in landing)} %; speeds within"
         f" {np.abs(speed).max():.1f} %, forces of the draw within {np.abs(hold).max():.1f} %",
-    )  # fmt: skip
+    )
 
 
 def section(bench: Bench) -> Theme:

@@ -16,10 +16,12 @@ from pipeline.simulator.model import GRAVITY
 
 @wp.kernel
 def _lead(
-    path: wp.array(dtype=wp.vec3), place: wp.array(dtype=wp.int32),
-    vertices: wp.array(dtype=wp.int32), offset: wp.array(dtype=wp.vec3),
+    path: wp.array(dtype=wp.vec3),
+    place: wp.array(dtype=wp.int32),
+    vertices: wp.array(dtype=wp.int32),
+    offset: wp.array(dtype=wp.vec3),
     positions: wp.array(dtype=wp.vec3),
-):  # fmt: skip
+):
     i = wp.tid()
     last = path.shape[0] - 1
     positions[vertices[i]] = path[wp.min(place[0], last)] + offset[i]
@@ -38,9 +40,16 @@ class Bands:
     """
 
     def __init__(
-        self, tube: Tube, theta, count: int, path: np.ndarray, *, step: float, iterations: int,
+        self,
+        tube: Tube,
+        theta,
+        count: int,
+        path: np.ndarray,
+        *,
+        step: float,
+        iterations: int,
         device: str = "cpu",
-    ):  # fmt: skip
+    ):
         """Args:
         path: Where the hand is at the end of each step [m], shape (S, 3).
         step: Of time [s].

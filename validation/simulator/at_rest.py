@@ -73,13 +73,16 @@ def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> li
     against = "closed form in uniaxial stress, P = μ (λ − J/λ²)"
     checks = [
         Measure(
-            f"pull of a straight string at stretch {stretch:g}, worst of E and ν", against,
-            off(*straight_pull(bench, stretch, theta, STRING)), "%", PULL_LIMIT,
+            f"pull of a straight string at stretch {stretch:g}, worst of E and ν",
+            against,
+            off(*straight_pull(bench, stretch, theta, STRING)),
+            "%",
+            PULL_LIMIT,
             f"a string {STRING} times thinner than the band; {len(theta)} pairs,"
             " E 0.03–10 MPa, ν 0.30–0.49, single precision",
         )
         for stretch in stretches
-    ]  # fmt: skip
+    ]
     checks.append(Measure(
         f"pull of the band itself at stretch {stretches[0]:g}, worst of E and ν", against,
         off(*straight_pull(bench, stretches[0], theta)), "%", None,
@@ -141,12 +144,16 @@ def beams(bench: Bench, poissons=BEAM_POISSON, double: bool = True) -> list[Meas
             )
             checks += [
                 Measure(
-                    title, f"Euler–Bernoulli, {formula}", off(deflection, 1.0), "%", limit,
+                    title,
+                    f"Euler–Bernoulli, {formula}",
+                    off(deflection, 1.0),
+                    "%",
+                    limit,
                     f"{deflection:.4f} of it on {count} edges, {note}"
                     + (MESH if all(clamped) and limit else ""),
                 )
                 for title, deflection, limit, count in both
-            ]  # fmt: skip
+            ]
     return checks
 
 

@@ -140,9 +140,17 @@ def growth(bench: Bench, count: int = 48) -> list[Measure]:
 
 
 def oscillate(
-    bench: Bench, theta, *, stretch: float = 1.5, axis: int = 0, mass: float = 0.5,
-    periods: float = 4.0, per_period: int = 800, sling: ClampedBand | None = None, **others: float,
-) -> tuple[np.ndarray, np.ndarray, tuple[float, float], tuple[float, float]]:  # fmt: skip
+    bench: Bench,
+    theta,
+    *,
+    stretch: float = 1.5,
+    axis: int = 0,
+    mass: float = 0.5,
+    periods: float = 4.0,
+    per_period: int = 800,
+    sling: ClampedBand | None = None,
+    **others: float,
+) -> tuple[np.ndarray, np.ndarray, tuple[float, float], tuple[float, float]]:
     """A heavy middle of a thin, light band, let go 1 % of the rest length off its place.
 
     Args:

@@ -202,18 +202,27 @@ def checks(done: Balance) -> list[Measure]:
     )
     return [
         Measure(
-            "balance of energy, largest miss at any time", against,
-            done.share(done.miss), "%", LIMIT,
+            "balance of energy, largest miss at any time",
+            against,
+            done.share(done.miss),
+            "%",
+            LIMIT,
             "of the hand's work; the steps' own loss is the miss",
         ),
         Measure(
-            "balance of energy, miss at the end", against,
-            float(100 * np.abs(done.miss[-1]) / total), "%", LIMIT,
+            "balance of energy, miss at the end",
+            against,
+            float(100 * np.abs(done.miss[-1]) / total),
+            "%",
+            LIMIT,
             f"hand {done.hand[-1]:.4f} J and turning {done.turning[-1]:.4f} J = {note} J",
         ),
         Measure(
-            "work of the fingers' turning, largest at any time", "—",
-            done.share(done.turning), "%", None,
+            "work of the fingers' turning, largest at any time",
+            "—",
+            done.share(done.turning),
+            "%",
+            None,
             "of the hand's work: what taking and leaving the direction of the middle does to the"
             f" elastic energy; the balance misses {done.share(done.miss - done.turning):.2f} %"
             " without it",
@@ -221,24 +230,36 @@ def checks(done: Balance) -> list[Measure]:
         Measure(
             "residual of the kernel's steps by the reference's forces",
             "balance with the steps' loss, by its formula, as an entry",
-            done.share(done.remainder), "%", LIMIT,
+            done.share(done.remainder),
+            "%",
+            LIMIT,
             "of the hand's work, largest at any time: every step is solved, no force is missing",
         ),
         Measure(
-            "lost to the steps while held", "0 for infinitely short steps",
-            done.share(done.integrator[held]), "%", LIMIT, "second order, of the hand's work",
+            "lost to the steps while held",
+            "0 for infinitely short steps",
+            done.share(done.integrator[held]),
+            "%",
+            LIMIT,
+            "second order, of the hand's work",
         ),
         Measure(
             "lost to the steps in the first 0.1 s after the release",
             "0 for infinitely short steps",
             float(100 * np.abs(done.integrator[taut] - done.integrator[held][-1]).max() / total),
-            "%", LIMIT, "second order, of the hand's work",
+            "%",
+            LIMIT,
+            "second order, of the hand's work",
         ),
         Measure(
-            "lost to the opening pads", "their friction at the band's path",
-            float(100 * done.pads[-1] / total), "%", None, "of the hand's work",
+            "lost to the opening pads",
+            "their friction at the band's path",
+            float(100 * done.pads[-1] / total),
+            "%",
+            None,
+            "of the hand's work",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def section(bench: Bench) -> Theme:

@@ -39,10 +39,14 @@ def young(bench: Bench) -> list[Measure]:
     single, two = held_force(bench, sling, _with(youngs_modulus=THETA[0] * np.array([1.0, 2.0])))
     return [
         Measure(
-            "held force at 2 E over that at E", "2", off(two / single, 2.0), "%", 0.5,
+            "held force at 2 E over that at E",
+            "2",
+            off(two / single, 2.0),
+            "%",
+            0.5,
             f"{two / single:.4f}; a weightless band in the episode, held fast",
         )
-    ]  # fmt: skip
+    ]
 
 
 def poisson(bench: Bench, stretch: float = 1.5) -> list[Measure]:
@@ -62,14 +66,21 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Measure]:
     return [
         Measure(
             f"volume that a string gains at stretch {stretch:g}, ν 0.30 and 0.49",
-            "J − 1 = μ/λ (1 − 1/l)", off(volume - 1, expected - 1), "%", 1.0,
+            "J − 1 = μ/λ (1 − 1/l)",
+            off(volume - 1, expected - 1),
+            "%",
+            1.0,
             f"{100 * (volume[0] - 1):.2f} % and {100 * (volume[1] - 1):.2f} %; {THIN}",
         ),
         Measure(
-            "pull at ν 0.49 over that at ν 0.30, same E", "P = μ (l − J/l²)",
-            off(pull[1] / pull[0], ratio), "%", 0.5, f"{pull[1] / pull[0]:.4f}; {THIN}",
+            "pull at ν 0.49 over that at ν 0.30, same E",
+            "P = μ (l − J/l²)",
+            off(pull[1] / pull[0], ratio),
+            "%",
+            0.5,
+            f"{pull[1] / pull[0]:.4f}; {THIN}",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def damping(bench: Bench) -> list[Measure]:
@@ -87,20 +98,30 @@ def damping(bench: Bench) -> list[Measure]:
     volume = closed_none / closed
     return [
         Measure(
-            "decay at 2 d over that at d", "2", off(twice / base, 2.0), "%", 1.0,
+            "decay at 2 d over that at d",
+            "2",
+            off(twice / base, 2.0),
+            "%",
+            1.0,
             f"{twice / base:.4f}; along the band, ν 0.30, s 1; {THIN}",
         ),
         Measure(
-            "decay lost from s = 1 to s = 0.5", "half of the shape part",
-            off((base - half) / (base - none), 0.5), "%", 1.0,
+            "decay lost from s = 1 to s = 0.5",
+            "half of the shape part",
+            off((base - half) / (base - none), 0.5),
+            "%",
+            1.0,
             f"{(base - half) / (base - none):.4f} of what is lost from 1 to 0; {THIN}",
         ),
         Measure(
-            "decay that is left at s = 0, over that at s = 1", "the volume part, d (λ − μ/3) J'²",
-            off(none / base, volume), "%", 2.0,
+            "decay that is left at s = 0, over that at s = 1",
+            "the volume part, d (λ − μ/3) J'²",
+            off(none / base, volume),
+            "%",
+            2.0,
             f"{none / base:.4f}, closed form {volume:.4f}; {THIN}",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def friction(bench: Bench, count: int = 33) -> list[Measure]:
@@ -128,20 +149,30 @@ def friction(bench: Bench, count: int = 33) -> list[Measure]:
     miss = 100 * np.abs(size[window] - expected).max() / size[first]
     return [
         Measure(
-            "least friction that holds the pull", "Coulomb, F = 2 μ N",
-            off(threshold, least), "%", 0.25,
+            "least friction that holds the pull",
+            "Coulomb, F = 2 μ N",
+            off(threshold, least),
+            "%",
+            0.25,
             f"{threshold:.4f}; {peak:.2f} N, pads of {sling.grip_force:g} N; below it: “{SLIP}”",
         ),
         Measure(
-            "θ below it that do not slip", "0", float(holds[tries < 0.999 * least].sum()), "θ", 0.0,
+            "θ below it that do not slip",
+            "0",
+            float(holds[tries < 0.999 * least].sum()),
+            "θ",
+            0.0,
             f"of {int((tries < 0.999 * least).sum())}",
         ),
         Measure(
             "force while the fingers open",
             f"pull − 2 μ N t / T, T {1e3 * sling.finger_opening_time:g} ms",
-            float(miss), "% of the pull", 0.1, f"gone after {1e3 * size[first] / rate:.2f} ms of T",
+            float(miss),
+            "% of the pull",
+            0.1,
+            f"gone after {1e3 * size[first] / rate:.2f} ms of T",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def section(bench: Bench) -> Theme:

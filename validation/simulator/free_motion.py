@@ -140,10 +140,13 @@ def momentum(bench: Bench) -> list[Measure]:
     checks.append(  # of the second order, the last of both
         Measure(
             "order of angular momentum in time, second order, what it is short of 2",
-            "conservation", float(np.maximum(2 - np.log2(coarse / fine), 0.0)), "", SHORT_OF_2,
+            "conservation",
+            float(np.maximum(2 - np.log2(coarse / fine), 0.0)),
+            "",
+            SHORT_OF_2,
             f"{coarse:.2g} and {fine:.2g} at steps of {1e3 * step:g} ms and half of them",
         )
-    )  # fmt: skip
+    )
     damped, finer = (recoil(bench, h, 2, THETA[2])[1] for h in (step, step / 2))
     checks.append(Measure(
         f"angular momentum out of nothing, second order, d {1e3 * THETA[2]:g} ms",

@@ -67,9 +67,14 @@ def differences(default: Launches, finer: Launches) -> dict[str, float]:
 
 
 def convergence(
-    bench: Bench, count: int = COUNT, meshes=(2, 4), progress=print,
-    sling: ClampedBand | None = None, history: LaunchHistory | None = None, **others: float,
-) -> list[Measure]:  # fmt: skip
+    bench: Bench,
+    count: int = COUNT,
+    meshes=(2, 4),
+    progress=print,
+    sling: ClampedBand | None = None,
+    history: LaunchHistory | None = None,
+    **others: float,
+) -> list[Measure]:
     sling, (thetas, draws) = sling or band_of(bench), random_launches(count)
     setup = setup_of(bench, history=history)
     thetas = Parameters.of(sling.law, thetas, **others)
@@ -117,12 +122,14 @@ def order_in_time(bench: Bench, count: int = COUNT) -> list[Measure]:
         Measure(
             f"order of the launch speed in time, what it is short of 2 at worst of {count}",
             f"{REFERENCE} times finer steps, double precision",
-            float(np.maximum(2 - lowest, 0.0)), "", SHORT_OF_2,
+            float(np.maximum(2 - lowest, 0.0)),
+            "",
+            SHORT_OF_2,
             f"lowest order {lowest:.2f} of any launch from steps of the default to 1/8 of it; at"
             f" 1, 1/2, 1/4, 1/8 the worst is {', '.join(f'{error:.2g}' for error in worst)} % off,"
             f" orders {', '.join(f'{order:.2f}' for order in orders)}",
         )
-    ]  # fmt: skip
+    ]
 
 
 def _flight(y: float, z: float, speed: float, angle: float, floor: float) -> float:
@@ -162,15 +169,22 @@ def physics(bench: Bench, count: int = COUNT) -> list[Measure]:
     named = sum(reason is not None for reason in done.failure)
     return [
         Measure(
-            "landing", "flight from where it leaves the pouch, integrated apart",
-            off(done.landing_y, flights), "%", 1e-4, f"{count} random θ and draws; {named} failed",
+            "landing",
+            "flight from where it leaves the pouch, integrated apart",
+            off(done.landing_y, flights),
+            "%",
+            1e-4,
+            f"{count} random θ and draws; {named} failed",
         ),
         Measure(
-            "energy of the projectile", "elastic energy of the drawn band",
-            float(100 * np.max(shares)), "% of it", 100.0,
+            "energy of the projectile",
+            "elastic energy of the drawn band",
+            float(100 * np.max(shares)),
+            "% of it",
+            100.0,
             f"{100 * np.min(shares):.0f}–{100 * np.max(shares):.0f} %, by damping",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def section(bench: Bench, progress=print) -> Theme:

@@ -119,32 +119,41 @@ def section(
 
     boundary = [
         Measure(
-            f"unconverged, and marked so, of {counts['rollouts']} rollouts {where}, held fast", "0",
-            float(len(counts["unconverged"])), "θ", 0.0,
+            f"unconverged, and marked so, of {counts['rollouts']} rollouts {where}, held fast",
+            "0",
+            float(len(counts["unconverged"])),
+            "θ",
+            0.0,
             ranges(counts["unconverged"]) if counts["unconverged"] else "",
         )
         for where, counts in (
             ("at the corners of the box", edges["corners"]),
             ("on its faces, one parameter at a bound", edges["faces"]),
         )
-    ]  # fmt: skip
+    ]
     checks = [
         Measure(
             f"not finite, though not marked failed, of {count} rollouts, {len(corners(bench))} at"
             f" corners and {faces} on faces of the box, {launches} with the default grip and"
             f" {launches} launches",
-            "0", float(sum(counts["not_finite"] for counts in surveys.values())), "θ", 0.0,
+            "0",
+            float(sum(counts["not_finite"] for counts in surveys.values())),
+            "θ",
+            0.0,
             f"farthest node {held['farthest_node_m']:.2f} m from the fork",
         ),
         Measure(
             f"unconverged, and marked so, of {count} rollouts within the box, held fast",
-            "0, or marked failed with a reason", float(len(held["unconverged"])), "θ", allowed,
+            "0, or marked failed with a reason",
+            float(len(held["unconverged"])),
+            "θ",
+            allowed,
             summary(held["reasons"]),
         ),
         *boundary,
         failed(f"failed of {launches} with the default grip", gripped),
         failed(f"failed of {launches} launches from random draws", launched),
-    ]  # fmt: skip
+    ]
     return Theme(
         "Random parameters",
         checks,

@@ -106,9 +106,12 @@ def pull(bench: Bench, stretches=(1.2, 1.6, 2.2), shapes=SHAPES) -> list[Measure
             f"pull of a thin string to stretch {max(stretches):g}, worst of shares and upturns"
             f" {', '.join(f'{share:g}, {upturn:g}' for share, upturn in shapes)}",
             "Biderman in uniaxial stress, P = μ (λ − λ⁻²)(1 − m + m/λ + c (I₁ − 3))",
-            worst, "%", PULL_LIMIT, f"{THIN} times thinner than the band, ν {FULL}",
+            worst,
+            "%",
+            PULL_LIMIT,
+            f"{THIN} times thinner than the band, ν {FULL}",
         )
-    ]  # fmt: skip
+    ]
 
 
 def cycle(bench: Bench, most: float = 1.8, softening: float = SOFTENING) -> list[Measure]:
@@ -125,11 +128,12 @@ def cycle(bench: Bench, most: float = 1.8, softening: float = SOFTENING) -> list
         Measure(
             f"stress of a slow cycle to stretch {most:g}, back, to {most + 0.2:g}, worst moment",
             "Ogden and Roxburgh's pseudo-elastic softening, by integrated works",
-            float(100 * np.abs(got - summary)[taut].max() / summary.max()), "% of its peak",
+            float(100 * np.abs(got - summary)[taut].max() / summary.max()),
+            "% of its peak",
             PULL_LIMIT,
             f"softening {softening:g}: {100 * (1 - min(left)):.0f} % less on the way back",
         )
-    ]  # fmt: skip
+    ]
 
 
 def relaxation(bench: Bench, shape=SHAPE, most: float = 1.6) -> list[Measure]:
@@ -225,10 +229,13 @@ def growth(bench: Bench, count: int = 16, kinds=tuple(STATES)) -> list[Measure]:
     return [
         Measure(
             "rise of elastic, kinetic and branches' energy in any one step, backward Euler",
-            "energy never grows without work", worst, "of the start", ROUNDING,
+            "energy never grows without work",
+            worst,
+            "of the start",
+            ROUNDING,
             f"{retained} of {count * len(kinds)} random states, of BOX; others are marked failed",
         )
-    ]  # fmt: skip
+    ]
 
 
 def slack(bench: Bench) -> list[Measure]:
@@ -252,10 +259,12 @@ def slack(bench: Bench) -> list[Measure]:
         Measure(
             "force on the hand a minute after a drawn band was led back, over the band's weight",
             "at most its weight: nothing is stretched",
-            float(force[-1] / weight) if not motion.failed[0] else float("nan"), "weights", 1.0,
+            float(force[-1] / weight) if not motion.failed[0] else float("nan"),
+            "weights",
+            1.0,
             f"{force[: len(table)].max():.1f} N at its most",
         )
-    ]  # fmt: skip
+    ]
 
 
 def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Measure]:
@@ -283,15 +292,20 @@ def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Measure]:
         Measure(
             "hold force of a launch with a history",
             "a simulated pull of 4 s and a pause of 2 s to that draw",
-            off(done.hold_force[0], hold), "%", 0.5,
+            off(done.hold_force[0], hold),
+            "%",
+            0.5,
             f"{done.hold_force[0]:.3f} N; {none.hold_force[0]:.3f} N without memory",
         ),
         Measure(
-            "landing with a history against one that has forgotten all", "—",
-            float(100 * (done.landing_y[0] / none.landing_y[0] - 1)), "%", None,
+            "landing with a history against one that has forgotten all",
+            "—",
+            float(100 * (done.landing_y[0] / none.landing_y[0] - 1)),
+            "%",
+            None,
             f"{done.landing_y[0]:.3f} m and {none.landing_y[0]:.3f} m",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def random_points(bench: Bench, count: int) -> Parameters:
@@ -310,15 +324,20 @@ def survey(bench: Bench, count: int = 10_000, progress=print) -> tuple[list[Meas
         Measure(
             f"not finite, though not marked failed, of {count} random points, negative shares among"
             " them",
-            "0", float(counts["not_finite"]), "θ", 0.0,
+            "0",
+            float(counts["not_finite"]),
+            "θ",
+            0.0,
         ),
         Measure(
             f"unconverged, and marked so, of {count} random points, held fast",
             "0, or marked failed with a reason",
-            float(len(counts["unconverged"])), "θ", robustness.ALLOWED * count / robustness.COUNT,
+            float(len(counts["unconverged"])),
+            "θ",
+            robustness.ALLOWED * count / robustness.COUNT,
             failed,
         ),
-    ], counts  # fmt: skip
+    ], counts
 
 
 def section(bench: Bench, count: int = 10_000, progress=print) -> Theme:

@@ -66,9 +66,13 @@ CAMPAIGNS = {
 
 
 def verify(
-    params, device: str = "cpu", progress: Callable[[str], None] = print, *,
-    extra: dict[str, Callable[[Bench], Theme]] | None = None, root: Path = Path("."),
-) -> list[Theme]:  # fmt: skip
+    params,
+    device: str = "cpu",
+    progress: Callable[[str], None] = print,
+    *,
+    extra: dict[str, Callable[[Bench], Theme]] | None = None,
+    root: Path = Path("."),
+) -> list[Theme]:
     """Run every check and write the report.
 
     Args:

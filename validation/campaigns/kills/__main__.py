@@ -95,9 +95,13 @@ def ended(copy: StruckCopy, expected: dict) -> dict[str, bool]:
 
 
 def disturb(
-    copy: StruckCopy, by: str, wanted: int, lines: ResultLines, expected: dict,
+    copy: StruckCopy,
+    by: str,
+    wanted: int,
+    lines: ResultLines,
+    expected: dict,
     attempt: Callable[[int, int], dict],
-) -> None:  # fmt: skip
+) -> None:
     """Disturb a command so often, and let it end well then."""
     name, going = copy.name, False
     while True:

@@ -224,9 +224,11 @@ def pulls(bench: Bench, engine: Engine) -> list[Measure]:
                 Measure(
                     f"hand, clamps and weight out of balance, {title}",
                     "the stress of PhysX's tetrahedra",
-                    float(rest), "%", 2.0 if (rate, iterations) == SETTINGS[0] else None,
+                    float(rest),
+                    "%",
+                    2.0 if (rate, iterations) == SETTINGS[0] else None,
                 )
-            )  # fmt: skip
+            )
     return measures
 
 

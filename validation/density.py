@@ -6,6 +6,7 @@ It sees episodes alone; nothing here knows the rig.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from pipeline.simulator.parameters import Parameters
 WORKERS = cores()
 
 
+@dataclass(frozen=True, eq=False)
 class Calibrated:
     """A method's θ of a band, and its simulator.
 
@@ -34,16 +36,11 @@ class Calibrated:
         coordinates: Of these samples, shape (M, D), or None.
     """
 
-    def __init__(
-        self,
-        sling: ClampedBand,
-        setup: LaunchSetup,
-        theta: Parameters,
-        samples: Parameters | None = None,
-        coordinates: np.ndarray | None = None,
-    ) -> None:
-        self.sling, self.setup, self.theta, self.samples = sling, setup, theta, samples
-        self.coordinates = coordinates
+    sling: ClampedBand
+    setup: LaunchSetup
+    theta: Parameters
+    samples: Parameters | None = None
+    coordinates: np.ndarray | None = None
 
     @property
     def identified(self) -> dict[str, float]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 
+from validation.marked import row
 from validation.paired import mean_interval
 
 AS_IS = "as it is"
@@ -65,19 +68,14 @@ def table(figures: dict, rows: dict[str, str], methods: dict[str, str]) -> list[
         rows, methods: What settings and methods are called, in their order.
     """
     heads = [head for name in methods.values() for head in (f"{name}: E", "force", "miss")]
-    lines = [f"| as the paper has it | bands | {' | '.join(heads)} |"]
-    lines.append(f"|---|---{'|---:' * len(heads)}|")
-    groups = dict.fromkeys(group for group_effects in figures.values() for group in group_effects)
+    lines = [row("as the paper has it", "bands", *heads), f"|---|---{'|---:' * len(heads)}|"]
+    groups = dict.fromkeys(group for of_groups in figures.values() for group in of_groups)
     for switch, words in rows.items():
         for group in sorted(groups, key=lambda name: (name != "rig", name)):
-            method_effects = [figures[method].get(group, {}) for method in methods]
-            if any(switch in switch_effects for switch_effects in method_effects):
-                cells = [
-                    cell
-                    for switch_effects in method_effects
-                    for cell in _cells(switch_effects, switch, group)
-                ]
-                lines.append(f"| {words} | {group} | {' | '.join(cells)} |")
+            of = [figures[method].get(group, {}) for method in methods]
+            if any(switch in effects_of for effects_of in of):
+                cells = chain.from_iterable(_cells(some, switch, group) for some in of)
+                lines.append(row(words, group, *cells))
     return lines
 
 
@@ -104,28 +102,16 @@ def runs(figures: dict, rows: dict[str, str], methods: dict[str, str]) -> list[s
     """Sentences: how many identifications are behind a row, and how many found nothing."""
     summary = []
     for method, name in methods.items():
-        groups = [
-            switch_effects for switch_effects in figures[method].values() if AS_IS in switch_effects
+        groups = [group for group in figures[method].values() if AS_IS in group]
+        counts, failed = (
+            {s: sum(group[s][figure] for group in groups if s in group) for s in rows}
+            for figure in ("runs", "failed")
+        )
+        others = [f"{n} {rows[s]}" for s, n in counts.items() if n not in (0, counts[AS_IS])]
+        summary.append(", ".join([f"{name}: {counts[AS_IS]} a row", *others]) + ".")
+        summary += [
+            f"{name}, {rows[s]}: {n} of {counts[s]} found no θ." for s, n in failed.items() if n
         ]
-        counts = {
-            switch: sum(
-                switch_effects[switch]["runs"]
-                for switch_effects in groups
-                if switch in switch_effects
-            )
-            for switch in rows
-        }
-        usual = counts[AS_IS]
-        others = [f"{n} {rows[s]}" for s, n in counts.items() if n not in (0, usual)]
-        summary.append(f"{name}: {usual} a row" + "".join(f", {other}" for other in others) + ".")
-        for switch, words in rows.items():
-            failed = sum(
-                switch_effects[switch]["failed"]
-                for switch_effects in groups
-                if switch in switch_effects
-            )
-            if failed:
-                summary.append(f"{name}, {words}: {failed} of {counts[switch]} found no θ.")
     return summary
 
 

@@ -7,53 +7,38 @@ or to PhysX, on a GPU.
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 from importlib.metadata import version
 from pathlib import Path
 
-from pipeline.base.environment import environment
+from pipeline.base import errors
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.export.card import ASKED
 from pipeline.params import load
 from sling2sim2real.exporting import export
 from sling2sim2real.identification import Identification
+from validation.reports import write_report
 
-REPORTS = Path("reports/validation")
-PACKAGES = {
-    "mjcf": ("mujoco",),
-    "newton": ("newton", "mujoco"),
-    "usd": (),
-}  # Newton's match: MuJoCo's
-COMMANDS = {
-    "mjcf": "python -m validation.exports",
-    "newton": "python -m validation.exports --to newton",
-    "usd": "python -m validation.exports --to usd band1_dip band2_dip band3_dip",
+REPORT = "reports/validation/export-{}.json"
+TARGETS = {  # device, packages (Newton's match is MuJoCo's), and the command's arguments
+    "mjcf": ("cpu", ("mujoco",), ""),
+    "newton": ("cpu", ("newton", "mujoco"), "--to newton"),
+    "usd": ("cuda:0", (), "--to usd band1_dip band2_dip band3_dip"),
 }
-KEPT = (
-    "met",
-    "engine",
-    "proof",
-    "matched",
-    "time_step_s",
-    "time_step_error",
-    "springs_error",
-    "pull",
-    "match",
-    "on_paper",
-    "factor_on_youngs_modulus",
-    "factor_on_mass",
-)
-DEVICES = {"usd": "cuda:0"}  # else the CPU
+KEPT = "met engine proof matched time_step_s time_step_error springs_error pull match on_paper"
+KEPT = (*KEPT.split(), "factor_on_youngs_modulus", "factor_on_mass")
 
 
-def main(target: str, bands: list[str]) -> None:
+def main() -> None:
     """Export, replay, write. Raises UserError."""
-    params, cards = load(), {}
-    for band in bands or params.run.bands:
+    parser = argparse.ArgumentParser(prog="python -m validation.exports")
+    parser.add_argument("--to", choices=TARGETS, default="mjcf")
+    parser.add_argument("bands", nargs="*", metavar="BAND")
+    args, params, cards = parser.parse_args(), load(), {}
+    target, (device, packages, arguments) = args.to, TARGETS[args.to]
+    for band in args.bands or params.run.bands:
         with tempfile.TemporaryDirectory() as folder:
             model = Identification.of_run(band, params.run.methods[0])
             episode = Episode.load_all(Layout().episodes(band))[0]
@@ -62,19 +47,12 @@ def main(target: str, bands: list[str]) -> None:
             raise UserError(f"{target}: its engine or a GPU is missing; nothing was launched there")
         cards[band] = {name: card[name] for name in KEPT if name in card}
         print(f"{band}: {'met' if card['met'] else 'NOT met'}", flush=True)
-    provenance = environment(DEVICES.get(target, "cpu"), COMMANDS[target])
-    provenance["versions"] |= {name: version(name) for name in PACKAGES[target]}
     met = all(card["met"] for card in cards.values())
-    report = REPORTS / f"export-{target}.json"
-    write_json(report, {"asked": ASKED, "met": met, "bands": cards, **provenance})
+    versions = {name: version(name) for name in packages}
+    content = {"asked": ASKED, "met": met, "bands": cards}
+    path = Path(REPORT.format(target))
+    write_report(path, content, arguments, device=device, versions=versions)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python -m validation.exports")
-    parser.add_argument("--to", choices=COMMANDS, default="mjcf")
-    parser.add_argument("bands", nargs="*", metavar="BAND")
-    arguments = parser.parse_args()
-    try:
-        main(arguments.to, arguments.bands)
-    except UserError as error:
-        sys.exit(f"error: {error}")
+    errors.run(main)

@@ -24,13 +24,7 @@ from stages.start import stage_of
 TODAY, OLDER = "today", "older code"
 UNKNOWN = "unknown: written before digests"
 NOT_TOLD = "unknown: DVC cannot tell"
-PATTERNS = (
-    "summary.json",
-    "bands/*/card.json",
-    "simulator*.json",
-    "*/*.json",
-    "validation/*/*.json",
-)
+PATTERNS = "summary.json bands/*/card.json simulator*.json */*.json validation/*/*.json".split()
 SIMULATOR = "pipeline/simulator"
 PARTS = ("pipeline", "validation")  # whose changes since a commit count
 SCRIPT = re.compile(r"\bvalidation[./][\w./]+")  # in a command, as a module or as a file
@@ -149,16 +143,8 @@ def _by_commit(content: dict, code: Path) -> str:
         return UNKNOWN
     clean = commit.removesuffix("-dirty")
     try:
-        requested = [
-            "git",
-            "diff",
-            "--quiet",
-            "--end-of-options",
-            clean,
-            "--",
-            *_parts(content, code),
-        ]
-        status = subprocess.run(requested, cwd=code, capture_output=True, check=False).returncode
+        words = ["git", "diff", "--quiet", "--end-of-options", clean, "--", *_parts(content, code)]
+        status = subprocess.run(words, cwd=code, capture_output=True, check=False).returncode
     except OSError:
         return UNKNOWN
     same = TODAY if clean == commit else UNKNOWN

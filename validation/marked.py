@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from pipeline.base.errors import UserError
+from pipeline.base.files import write_text
 
 CODE_BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)  # language, code
 
@@ -15,6 +16,17 @@ CODE_BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)  # l
 def marks(name: str) -> tuple[str, str]:
     """The first and the last line of a block."""
     return f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->\n"
+
+
+def block_of(name: str, lines: Iterable[str]) -> str:
+    """Lines between the marks of a block."""
+    begin, end = marks(name)
+    return begin + "\n".join(lines) + "\n" + end
+
+
+def row(*cells: object) -> str:
+    """A row of a table."""
+    return f"| {' | '.join(map(str, cells))} |"
 
 
 def with_block(page: str, block: str) -> str:
@@ -27,6 +39,11 @@ def with_block(page: str, block: str) -> str:
         raise UserError(f"the page has not one {begin.strip()} and one {end.strip()}")
     head, rest = page.split(begin)
     return head + block + rest.split(end)[1]
+
+
+def fill(page: Path, block: str) -> None:
+    """Write a block into a page, in the place of the one that it has."""
+    write_text(page, with_block(page.read_text(encoding="utf-8"), block))
 
 
 def compared_or_fixed(page: Path, drawn: Callable[[str], str], docstring: str | None) -> int:

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.params import Params
+from validation.projects import changed
 
 NAME = "orange"
 ABOUT = {"source": "recording", "mass": 0.0408, "diameter": 0.010, "rest_length": 0.52}
@@ -15,9 +16,7 @@ ABOUT = {"source": "recording", "mass": 0.0408, "diameter": 0.010, "rest_length"
 
 def with_orange(params: Params) -> Params:
     """params.yaml with that band, whose hand was where its pose says."""
-    content = params.model_dump(mode="json", exclude_unset=True)
-    content["bands"][NAME], content["setup"]["arm_stiffness"] = ABOUT, None
-    return type(params).model_validate(content)
+    return changed(params, {f"bands.{NAME}": ABOUT, "setup.arm_stiffness": None})
 
 
 def landings(folder: Path) -> tuple[np.ndarray, np.ndarray]:

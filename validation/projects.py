@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -18,7 +18,7 @@ import psutil
 from ruamel.yaml import YAML
 
 from pipeline.base.code import ROOT
-from pipeline.params import load
+from pipeline.params import Params, load
 from pipeline.params.identification import methods_by_step
 
 DEFAULTS = ROOT / "validation" / "params.yaml"  # as delivered, whatever a user sets in params.yaml
@@ -79,13 +79,29 @@ def set_params(folder: Path, values: Mapping[str, object]) -> None:
     """Set values in params.yaml of a project, by keys with dots."""
     yaml, path = YAML(), folder / "params.yaml"
     content = yaml.load(path)
+    _set(content, values)
+    yaml.dump(content, path)
+
+
+def changed(params: Params, values: Mapping[str, object]) -> Params:
+    """Parameters with other values, by keys with dots, checked again."""
+    content = params.model_dump(mode="json", exclude_unset=True)
+    _set(content, values)
+    return type(params).model_validate(content)
+
+
+def with_section(params: Params, name: str, **values: object) -> Params:
+    """Parameters with other values in one section, which are not checked."""
+    return params.model_copy(update={name: getattr(params, name).model_copy(update=values)})
+
+
+def _set(content: dict, values: Mapping[str, object]) -> None:
     for key, value in values.items():
         *sections, name = key.split(".")
         node = content
         for section in sections:
             node = node[section]
         node[name] = value
-    yaml.dump(content, path)
 
 
 def run_of(
@@ -114,7 +130,13 @@ def environment(**more: str) -> dict[str, str]:
 
 
 class ProjectCopy:
-    """A folder in which commands run, with `more` in their environment."""
+    """A folder in which commands run, with `more` in their environment.
+
+    Attributes:
+        limit: That a command may take [s]; None: any time.
+    """
+
+    limit: float | None = 1200.0
 
     def __init__(self, folder: Path, **more: str) -> None:
         self.folder = folder
@@ -124,7 +146,7 @@ class ProjectCopy:
     def __call__(self, *command: str) -> str:
         """What a command prints. Raises AssertionError where it fails."""
         options = {"cwd": self.folder, "env": self.environment, "capture_output": True}
-        done = subprocess.run(command, text=True, timeout=1200, **options)
+        done = subprocess.run(command, text=True, timeout=self.limit, **options)
         assert done.returncode == 0, f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}"
         self.errors = done.stderr
         return done.stdout
@@ -174,11 +196,12 @@ class MarkedRun:
         """Processes with `word` in their command line."""
         return [process for process in self.alive() if word in command_line(process)]
 
-    def left(self, seconds: float = PROMPT) -> list[str]:
-        """Commands of what still lives after so long; what does is killed then."""
-        wait(lambda: not self.alive(), seconds)
-        left = self.alive()
-        message = [command_line(process) for process in left]
+    def left(self, seconds: float = PROMPT, apart: Collection[int] = ()) -> list[str]:
+        """Commands of what still lives after so long, but those by number; what does is killed."""
+        alive = lambda: [process for process in self.alive() if process.pid not in apart]  # noqa: E731
+        wait(lambda: not alive(), seconds)
+        left = alive()
+        message = [line for process in left if (line := command_line(process))]
         for process in left:
             send(process)
         return message

@@ -9,22 +9,21 @@ docs/real.md. The measurements stay where they are: no file of theirs goes into 
 
 from __future__ import annotations
 
-import argparse
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
 from pipeline.base.machine import cores
 from pipeline.params import load
 from pipeline.params.identification import SlingParams
+from validation.campaigns import runner
 from validation.projects import DEFAULTS
 from validation.real import data, figures
 from validation.real.ropes import NAMES, RATE, chords_of, fitted, inner, swing
+from validation.reports import write_report
 
 REPORT = Path("reports/validation/real-ropes.json")
 FIGURES = Path("docs/real")
@@ -83,9 +82,8 @@ def finer(run: np.ndarray, rope: dict, size: SlingParams, chords: np.ndarray) ->
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = runner.parser(__doc__, REPORT)
     parser.add_argument("--data", type=Path, required=True, help="folder of the measurements")
-    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
     args = parser.parse_args()
     runs = data.ropes(args.data)
     if not runs or any(len(two) < 2 for two in runs.values()):
@@ -112,8 +110,7 @@ def main() -> None:
         "ropes": ropes,
     }
     figures.draw_ropes(FIGURES, {name: two[1] for name, two in runs.items()}, summary, content)
-    command = "python -m validation.real_ropes --data ../shared/data/real"
-    write_json(args.report, content | environment("cpu", command))
+    write_report(args.report, content, "--data ../shared/data/real")
     print(f"wrote {args.report} and {FIGURES}/ropes.png")
 
 

@@ -8,24 +8,22 @@ where they are: no file of theirs goes into the project.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
 from pipeline.params.identification import LAWS
 from pipeline.simulator.rubber import RUBBER
+from validation.campaigns import runner
 from validation.real import data, figures, fits
+from validation.reports import plain, write_report
 
 REPORT = Path("reports/validation/real-rubber.json")
 FIGURES = Path("docs/real")
 TOPS = 1.66, 1.85, 2.5  # stretches up to which silicones are fitted
-NATURAL = "Treloar_1944", "Jones_1975", "Kawabata_1981"
 FIRST, LONG = (300.0, 3000.0), 86_400.0  # s
 SOURCES = {
     "srmd_silicones": "Marechal et al., Soft Robotics 2021 (LucMarechal/Soft-Robotics-Materials-"
@@ -38,10 +36,6 @@ SOURCES = {
 }
 
 
-def rounded(values: dict[str, float]) -> dict[str, float]:
-    return {name: float(f"{value:.4g}") for name, value in values.items()}
-
-
 def silicones(folder: Path) -> dict:
     """Fits of each specimen up to each of TOPS."""
     specimens = {}
@@ -50,9 +44,8 @@ def silicones(folder: Path) -> dict:
         for top in TOPS:
             curve = whole.up_to(top, data.SLACK)
             fit = fits.shape_of(curve, fits.MOST_SLACK)
-            rows[f"{top:g}"] = rounded(
-                {"rms_percent": fit.rms, "noise_percent": fits.noise_of(curve)} | fit.values
-            )
+            noise = {"rms_percent": fit.rms, "noise_percent": fits.noise_of(curve)}
+            rows[f"{top:g}"] = plain(noise | fit.values, 4)
         specimens[whole.name] = rows
     return specimens
 
@@ -95,7 +88,7 @@ def multiaxial(folder: Path) -> dict:
         sources[source] = {
             "uniaxial_points": len(rows),
             "uniaxial_rms_percent": float(f"{fit.rms:.3g}"),
-            "values": rounded(fit.values),
+            "values": plain(fit.values, 4),
             "predicted_rms_percent": predicted,
         }
     return sources
@@ -140,10 +133,9 @@ def latex(folder: Path) -> dict:
             "relaxation_per_decade": float(q[3]),
         }
 
-    misses = {"whole": rounded(miss(fit(LONG * 2)))}
-    for until in FIRST:
-        misses[f"forecast_from_{until:g}_s"] = rounded(miss(fit(until)))
-    return misses
+    misses = {"whole": miss(fit(LONG * 2))}
+    misses |= {f"forecast_from_{until:g}_s": miss(fit(until)) for until in FIRST}
+    return plain(misses, 4)
 
 
 def acrylic(folder: Path) -> dict:
@@ -157,7 +149,7 @@ def acrylic(folder: Path) -> dict:
         done = fits.memory_of(curves, free)
         result[name] = {
             "rms_percent": float(f"{np.sqrt(np.mean([fit.rms**2 for fit in done])):.3g}"),
-            "values": rounded(done[0].values),
+            "values": plain(done[0].values, 4),
             "by_history": {
                 c.name: float(f"{fit.rms:.3g}") for c, fit in zip(curves, done, strict=True)
             },
@@ -166,9 +158,8 @@ def acrylic(folder: Path) -> dict:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = runner.parser(__doc__, REPORT)
     parser.add_argument("--data", type=Path, required=True, help="folder of the measurements")
-    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
     args = parser.parse_args()
     missing = [name for name in SOURCES if not (args.data / name).is_dir()]
     if missing:
@@ -185,8 +176,7 @@ def main() -> None:
         "vhb4910": acrylic(args.data),
     }
     figures.draw(FIGURES, args.data, content)
-    command = "python -m validation.real_rubber --data ../shared/data/real"
-    write_json(args.report, content | environment("cpu", command))
+    write_report(args.report, content, "--data ../shared/data/real")
     print(f"wrote {args.report} and {FIGURES}/")
 
 

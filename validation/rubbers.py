@@ -27,6 +27,7 @@ from colorsys import hsv_to_rgb
 import numpy as np
 
 from pipeline.params import Params
+from validation.projects import changed
 
 DEVELOP, SEALED, SPENT = 20261101, 20261229, 20261207  # seeds
 COUNT = {DEVELOP: 4, SEALED: 16, SPENT: 16}
@@ -122,11 +123,9 @@ def with_rubbers(
         worn: They were drawn as far before (`bands.<name>.preconditioned`).
     """
     drawn = rubbers(seed)
-    content = params.model_dump(mode="json", exclude_unset=True)
-    content["bands"] |= {name: band for name, (band, _) in drawn.items()}
-    content["rig"]["bands"] |= {name: rubber for name, (_, rubber) in drawn.items()}
-    content["rig"] |= {"seed": 100 + recording, "pull": pull}
+    values: dict[str, object] = {"rig.seed": 100 + recording, "rig.pull": pull}
+    for name, (band, rubber) in drawn.items():
+        values |= {f"bands.{name}": band, f"rig.bands.{name}": rubber}
     if worn:
-        for band in content["bands"].values():
-            band["preconditioned"] = DRAWN
-    return Params.model_validate(content)
+        values |= {f"bands.{name}.preconditioned": DRAWN for name in (*params.bands, *drawn)}
+    return changed(params, values)

@@ -11,14 +11,7 @@ from pipeline.identify.posterior.likelihood import Tolerances
 from pipeline.identify.posterior.residuals import Rule
 from pipeline.params import load
 from tests.project import ROOT
-from validation.campaigns.attribution import (
-    METHODS,
-    PAGE,
-    REPORT,
-    against_given,
-    block,
-    recoil_of,
-)
+from validation.campaigns.attribution import METHODS, PAGE, REPORT, against_given, block, recoil_of
 from validation.campaigns.runner import OURS
 from validation.campaigns.variants import with_variants
 from validation.projects import DEFAULTS

@@ -11,11 +11,7 @@ from pipeline.base.errors import UserError
 from pipeline.recording.build import episode_of, process
 from validation.campaigns import mutations, outcomes
 from validation.campaigns.damage import mutated
-from validation.recordings.small import (
-    FAMILIES,
-    small_params,
-    write_small,
-)
+from validation.recordings.small import FAMILIES, small_params, write_small
 
 EACH = 10
 SORTS = (outcomes.SAME, outcomes.SAID, outcomes.LINE)

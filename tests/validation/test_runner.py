@@ -8,15 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from validation.campaigns.runner import (
-    THREADS,
-    ResultLines,
-    made_once,
-    plain,
-    result_of,
-    run,
-    single_threaded,
-)
+from validation.campaigns.runner import THREADS, ResultLines, made_once, run, single_threaded
+from validation.reports import plain
 
 
 @dataclass(frozen=True)
@@ -29,17 +22,13 @@ class Square:
         return {"square": self.number**2, "threads": os.environ["OMP_NUM_THREADS"]}
 
 
-def work_on(job: Square) -> dict:
-    return result_of(job, job)
-
-
 def test_a_run_that_was_killed_goes_on(tmp_path) -> None:
     """The last line may be cut short; that one is done again."""
     path = tmp_path / "work" / "results.jsonl"
     ResultLines(path).add({"number": 2, "square": "kept"})
     with path.open("a") as file:
         file.write('{"number": 3, "squ')
-    run(work_on, [Square(2), Square(3), Square(-1)], ResultLines(path), 1)
+    run(Square.__call__, [Square(2), Square(3), Square(-1)], ResultLines(path), 1)
     assert ResultLines(path).of(Square) == {
         Square(2): {"number": 2, "square": "kept"},
         Square(3): {"number": 3, "square": 9, "threads": "1"},
@@ -53,7 +42,7 @@ def test_a_run_that_was_killed_goes_on(tmp_path) -> None:
 
 def slow(job: Square) -> dict:
     time.sleep(60)
-    return work_on(job)
+    return job()
 
 
 def test_a_run_ends_when_the_time_is_over(tmp_path, capsys) -> None:
@@ -67,7 +56,7 @@ def test_a_run_ends_when_the_time_is_over(tmp_path, capsys) -> None:
 def broken(job: Square) -> dict:
     if job.number == 1:
         raise ValueError("a fault of ours")
-    return work_on(job)
+    return job()
 
 
 def test_an_error_ends_the_run_and_what_was_done_is_kept(tmp_path) -> None:

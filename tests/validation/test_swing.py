@@ -6,24 +6,12 @@ import numpy as np
 import pytest
 
 from pipeline.episode.signal import cutoff_hz
-from pipeline.params import load
-from pipeline.simulator.model import ClampedBand, LaunchSetup
+from pipeline.simulator.model import LaunchSetup
 from pipeline.simulator.parameters import Parameters
-from tests.project import DEFAULTS
 from validation.campaigns.swing import PARTS, D, S, SplitPictures, _damped, landed
 from validation.synthetic import own_law_episode, pull_and_release
 
 THETA = Parameters.of("neo_hookean", [2.2e5, 0.45, 3e-3, 0.9, 0.8])
-
-
-@pytest.fixture(scope="module")
-def params():
-    return load(DEFAULTS)
-
-
-@pytest.fixture(scope="module")
-def sling(params) -> ClampedBand:
-    return ClampedBand.of(params.bands["band1"], params.setup, params.sling)
 
 
 @pytest.fixture(scope="module")

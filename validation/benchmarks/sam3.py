@@ -10,7 +10,6 @@ Writes reports/benchmarks/sam3-h200.json.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from importlib.metadata import version
 from pathlib import Path
@@ -19,12 +18,12 @@ from types import SimpleNamespace
 import numpy as np
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
-from pipeline.base.files import write_json
 from pipeline.recording.masks.sam3 import Sam3Mask
 from validation.benchmarks.timing import timed
+from validation.campaigns import runner
 from validation.recordings import looks
 from validation.recordings.tiny_sam3 import save_tiny_sam3, save_tokenizer
+from validation.reports import write_report
 
 REPORT = Path("reports/benchmarks/sam3-h200.json")
 LOOK, PROMPT = "orange on grey, white arm", "rubber band"
@@ -74,19 +73,17 @@ def full(folder: Path, device: str) -> dict:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = runner.parser(__doc__, REPORT)
     parser.add_argument("--device", default="cuda:0", help="a GPU (default: cuda:0)")
-    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
     args = parser.parse_args()
-    provenance = environment(args.device, "python -m validation.benchmarks.sam3")
-    provenance["versions"] |= {name: version(name) for name in ("torch", "transformers")}
+    versions = {name: version(name) for name in ("torch", "transformers")}
     with tempfile.TemporaryDirectory() as folder:
         content = {
             "weights": "random",
             "tiny": tiny(Path(folder, "tiny"), args.device),
             "real": full(Path(folder, "real"), args.device),
         }
-    write_json(args.report, content | provenance)
+    write_report(args.report, content, device=args.device, versions=versions)
     print(f"{args.report}: {content}")
 
 

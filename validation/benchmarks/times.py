@@ -24,13 +24,14 @@ from pathlib import Path
 
 from pipeline.base import errors
 from pipeline.base.code import ROOT, digests
-from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json, write_text
+from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import commit
-from validation.benchmarks.command import disk, measured
-from validation.marked import marks, with_block
+from validation.benchmarks.timing import disk, measured
+from validation.campaigns.runner import read
+from validation.marked import fill, marks
+from validation.reports import write_report
 
 REPORT, PAGE = Path("reports/benchmarks/times.json"), Path("docs/times.md")
 SECONDS = Path("app/fit/seconds.json")
@@ -157,10 +158,7 @@ def seconds_of_fit(folder: Path) -> dict[str, int]:
 def perform(step: MeasuredStep, done: dict[str, dict], folder: Path) -> dict:
     """What a step's file in `folder` says; measured now where it is not there or failed."""
     result_file, log = folder / f"{step.name}.json", folder / f"{step.name}.log"
-    if (
-        result_file.is_file()
-        and (result := json.loads(result_file.read_text(encoding="utf-8")))["ok"]
-    ):
+    if result_file.is_file() and (result := read(result_file))["ok"]:
         return result
     if step.needs and not done[step.needs].get("ok"):
         return {"ok": False, "why": f"needs {step.needs}"}
@@ -235,7 +233,7 @@ def _size(count: float) -> str:
 
 
 def times(
-    todo: Sequence[MeasuredStep], folder: Path, root: Path, skipped: dict[str, str], command: str
+    todo: Sequence[MeasuredStep], folder: Path, root: Path, skipped: dict[str, str], arguments: str
 ) -> dict:
     """Measure the steps and write report and page of `root`; what the report says. UserError."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -252,24 +250,23 @@ def times(
         summary = result.get("why") or result.get("skipped") or f"{result['seconds']:.0f} s"
         print(f"{step.name}: {summary}", file=sys.stderr, flush=True)
     scripts = [clone / "app/cli.py", *sorted((clone / "stages").glob("[a-z]*.py"))]
-    report = environment("cpu", command) | {
+    content = {
         "about": "Each step in one fresh clone with a new .venv and caches of its own. Memory is"
         " the peak of the process tree (PSS, looked at once a second); others_share is the share of"
         " the cores that other programs took meanwhile. `sling check` and `sling fit` are of one"
         " recording that was not made here.",
-        "commit": json.loads((folder / "clone.json").read_text(encoding="utf-8"))["commit"],
+        "commit": read(folder / "clone.json")["commit"],
         "simulator": fingerprint(clone / "pipeline/simulator")[:12],
         "code": digests(*(script for script in scripts if script.is_file()), root=clone),
         "steps": done,
         "order": [step.name for step in todo],
         "met": all(outcome["ok"] or "skipped" in outcome for outcome in done.values()),
     }
-    write_json(root / REPORT, report)
+    report = write_report(root / REPORT, content, arguments)
     fits = seconds_of_fit(folder / "demo") | seconds_of_fit(clone)  # a recording's, and a demo's
     if fits:
         write_json(root / SECONDS, fits)
-    page = root / PAGE
-    write_text(page, with_block(page.read_text(encoding="utf-8"), table(report)))
+    fill(root / PAGE, table(report))
     return report
 
 
@@ -279,13 +276,13 @@ def main() -> int:
     parser.add_argument("--recording", type=Path, help="MCAP of a band, for `sling fit`")
     parser.add_argument("--mass", type=float, default=0.0408, help="of that band, in kg")
     arguments = parser.parse_args()
-    file, command = arguments.recording, "python -m validation.benchmarks.times --folder FOLDER"
+    file, words = arguments.recording, "--folder FOLDER"
     if file and not file.is_file():
         raise UserError(f"{file}: no such file")
     skipped = {} if file else dict.fromkeys(NEED_RECORDING, "no --recording was given")
-    command += f" --recording {file.name} --mass {arguments.mass:g}" if file else ""
+    words += f" --recording {file.name} --mass {arguments.mass:g}" if file else ""
     todo = steps(file, arguments.mass)
-    report = times(todo, arguments.folder.resolve(), ROOT, skipped, command)
+    report = times(todo, arguments.folder.resolve(), ROOT, skipped, words)
     return 0 if report["met"] else 1
 
 

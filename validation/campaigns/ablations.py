@@ -25,15 +25,13 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
 from pipeline.base.machine import processor
 from pipeline.params import Params, expect_known, load
 from pipeline.params.identification import MethodParams
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import aimed, errors_on_the_rig, identified, recorded
-from validation.campaigns.runner import PAPER, ResultLines, plain, result_of
+from validation.campaigns.runner import PAPER, ResultLines
 from validation.campaigns.variants import (
     BESIDE,
     LAST,
@@ -44,6 +42,8 @@ from validation.campaigns.variants import (
     with_variants,
 )
 from validation.paired import LEVEL, compared, mean_interval
+from validation.projects import with_section
+from validation.reports import write_report
 
 WORK = Path("data/ablations")
 REPORT = Path("reports/validation/ablations.json")
@@ -86,9 +86,7 @@ def place(work: Path, band: str, recording: int) -> Path:
 def record(where: tuple[str, int], work: Path) -> None:
     """Make a recording's episode, with its clamps; what is there stays."""
     band, number = where
-    params = load()
-    params = params.model_copy(update={"rig": params.rig.model_copy(update={"seed": number})})
-    recorded(params, band, place(work, band, number))
+    recorded(with_section(load(), "rig", seed=number), band, place(work, band, number))
 
 
 @cache  # in each process
@@ -96,12 +94,12 @@ def _params(method: str, preset: str | None) -> Params:
     return with_variants(of_job(load(), method, preset))
 
 
-def aimed_and_launched(job: Job, params: Params, folder: Path) -> dict:
-    """What one identification found of the episode in `folder`, and where its launches land."""
-    pads = job.method != "nominal_pads"
+def aimed_and_launched(job: Job, work: Path, preset: str | None) -> dict:
+    """What one identification found of its episode, and where its launches land."""
+    params, folder = _params(job.method, preset), place(work, job.band, job.recording)
     with priors_of(job.method):
         identification = identified(
-            params, job.band, job.method, job.seed, folder, recorded_pads=pads
+            params, job.band, job.method, job.seed, folder, recorded_pads=True
         )
     draws = aimed(identification.outcome, params, params.trials.targets)
     return {
@@ -111,17 +109,6 @@ def aimed_and_launched(job: Job, params: Params, folder: Path) -> dict:
         "error_m": errors_on_the_rig(job.band, params, draws),
         "seconds": identification.seconds,
     }
-
-
-def work_on(job: Job, work: Path, preset: str | None) -> dict:
-    """The result of a job."""
-    folder = place(work, job.band, job.recording)
-    make = partial(aimed_and_launched, job, _params(job.method, preset), folder)
-    return result_of(job, make, processor=processor())
-
-
-def lines_in(work: Path) -> ResultLines:
-    return ResultLines(work / "results.jsonl")
 
 
 def scores(results: list[dict], name: str) -> np.ndarray:
@@ -154,20 +141,16 @@ def summary(results: list[dict], bands: Sequence[str], methods: Sequence[str]) -
     for band in [*bands, "all"]:
         of = bands if band == "all" else [band]
         rows = {m: [r for b in of for r in picked(b, m, single)] for m in methods}
-        miss = {
-            method: scores(method_results, "miss_cm") for method, method_results in rows.items()
-        }
+        miss = {method: scores(some, "miss_cm") for method, some in rows.items()}
         figures[band] = {"methods": {}, f"less_{PAPER}": compared(miss, PAPER)}
-        for method, method_results in rows.items():
-            run = [result for result in method_results if result.get("failed") != "not run"]
-            signed = [
-                np.nan if lost(result) else mean_of(result["error_m"]) for result in method_results
-            ]
+        for method, some in rows.items():
+            run = [result for result in some if result.get("failed") != "not run"]
+            signed = [np.nan if lost(result) else mean_of(result["error_m"]) for result in some]
             figures[band]["methods"][method] = {
                 "miss_cm": mean_interval(miss[method]),
                 "bias_cm": mean_interval(100 * np.array(signed, float)),
-                "youngs_modulus": mean_interval(scores(method_results, "youngs_modulus")),
-                "loss": mean_interval(scores(method_results, "loss")),
+                "youngs_modulus": mean_interval(scores(some, "youngs_modulus")),
+                "loss": mean_interval(scores(some, "loss")),
                 "run": len(run),
                 "without_landing": sum(map(lost, run)),
                 "targets_out_of_reach": sum(
@@ -208,19 +191,16 @@ def mean_of(values) -> float:
     return float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
 
 
-def report(args: argparse.Namespace, params: Params) -> None:
+def report(args: argparse.Namespace, params: Params, jobs: list[Job]) -> None:
     """Write what the results in the work folder say."""
-    wanted = set(jobs_of(args.bands, args.methods, args.recordings, args.seeds, args.first))
-    results = [result for job, result in lines_in(args.work).of(Job).items() if job in wanted]
-    if not results:
-        raise UserError(f"{args.work}: holds no result of these bands and methods")
+    wanted, lines = set(jobs), ResultLines(args.work / "results.jsonl").of(Job)
+    results = runner.expect([lines[job] for job in lines if job in wanted], args.work)
     same = [
         name
         for name in args.methods
         if _of_one_loss(params.methods[name], params) and "loss" not in SETTINGS.get(name, {})
     ]
-    command = "python -m validation.campaigns.ablations"
-    command += f" --workers {args.workers} --recordings {args.recordings} --seeds {args.seeds}"
+    command = f"--workers {args.workers} --recordings {args.recordings} --seeds {args.seeds}"
     if args.preset:
         command += f" --preset {args.preset} --report {args.report}"
     content = {
@@ -236,7 +216,7 @@ def report(args: argparse.Namespace, params: Params) -> None:
             },
             "search_seeds_on_the_first": sorted({result["seed"] for result in results}),
             "preset": args.preset,
-            "pads": "open as fast as the recorded force fell; of nominal_pads in the lab's time",
+            "pads": "open as fast as the recorded force fell",
             "optimizer": of_job(params, PAPER, args.preset).optimizer.model_dump(),
             "rollouts": {
                 name: rollouts_of_search(of_job(params, name, args.preset), name)
@@ -255,34 +235,33 @@ def report(args: argparse.Namespace, params: Params) -> None:
             "over_recordings": mean_interval(rank_correlations(results, same)),
         },
         "figures": summary(results, args.bands, args.methods),
-        **environment("cpu", command),
     }
-    write_json(args.report, plain(content))
+    write_report(args.report, content, command)
     print(f"{args.report}: {len(results)} of {len(wanted)} results", flush=True)
 
 
-def run(args: argparse.Namespace) -> None:
+def run(args: argparse.Namespace, jobs: list[Job]) -> None:
     """Work through the jobs that have no result yet, until the time is over."""
-    results, there = lines_in(args.work), lines_in(args.work).of(Job)
+    results = ResultLines(args.work / "results.jsonl")
+    there = results.of(Job)
     jobs = [
         job
-        for job in jobs_of(args.bands, args.methods, args.recordings, args.seeds, args.first)
+        for job in jobs
         if (place(args.work, job.band, job.recording) / "mounting.json").exists()
         and job not in there
     ]
     print(f"{len(jobs)} identifications on {args.workers} processes", flush=True)
-    work = partial(work_on, work=args.work, preset=args.preset)
-    end = time.monotonic() + 60 * args.minutes
-    runner.run(work, jobs[:1], results, 1)  # compiles, once
-    runner.run(work, jobs[1:], results, args.workers, (end - time.monotonic()) / 60)
+    work = partial(aimed_and_launched, work=args.work, preset=args.preset)
+    end, on = time.monotonic() + 60 * args.minutes, {"processor": processor()}
+    runner.run(work, jobs[:1], results, 1, **on)  # compiles, once
+    runner.run(work, jobs[1:], results, args.workers, (end - time.monotonic()) / 60, **on)
 
 
 def main() -> None:
     params = with_variants(load())
     usual = [name for name in params.methods if name not in BESIDE]
-    parser = runner.parser(__doc__, REPORT, WORK, minutes=True)
+    parser = runner.parser(__doc__, REPORT, WORK)
     parser.add_argument("--record", action="store_true", help="make the episodes, nothing else")
-    parser.add_argument("--report-only", action="store_true", help="of what is there")
     parser.add_argument("--preset", help="of presets/, its keys of `optimizer`")
     parser.add_argument("--bands", nargs="+", default=list(params.run.rig))
     parser.add_argument("--methods", nargs="+", default=usual)
@@ -298,12 +277,11 @@ def main() -> None:
     if args.record:
         numbers = range(args.first, args.first + args.recordings)
         every = [(band, number) for number in numbers for band in args.bands]
-        for _ in runner.each(partial(record, work=args.work), every, args.workers):
-            pass
-        return
+        return runner.prepare(args, partial(record, work=args.work), every)
+    jobs = jobs_of(args.bands, args.methods, args.recordings, args.seeds, args.first)
     if not args.report_only:
-        run(args)
-    report(args, params)
+        run(args, jobs)
+    report(args, params, jobs)
 
 
 if __name__ == "__main__":

@@ -14,9 +14,8 @@ After a change of pulls or methods, give another --work.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -25,8 +24,6 @@ from unittest import mock
 import numpy as np
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
-from pipeline.base.files import write_json, write_text
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.likelihood import Tolerances, opening_time
 from pipeline.identify.posterior.residuals import Rule
@@ -35,21 +32,15 @@ from pipeline.params import Params, load
 from rig.oracle.world import World
 from validation.campaigns import runner
 from validation.campaigns.landings import SETS, together
-from validation.campaigns.rig_scores import (
-    built,
-    recorded,
-    saved,
-    scored,
-    sling_of,
-    summary,
-)
-from validation.campaigns.runner import OURS, PAPER, ResultLines, plain, result_of
+from validation.campaigns.rig_scores import built, recorded, saved, scored, sling_of, summaries
+from validation.campaigns.runner import OURS, PAPER, read
 from validation.campaigns.variants import priors_of, with_variants
 from validation.density import Calibrated, calibrated_by
-from validation.marked import marks, with_block
+from validation.marked import block_of, fill, row
 from validation.orange import NAME as ORANGE
 from validation.orange import landings, with_orange
 from validation.projects import DEFAULTS
+from validation.reports import plain, write_report
 from validation.rubbers import SPENT, rubbers, with_rubbers
 
 METHODS = {  # and the words of the table
@@ -69,7 +60,8 @@ EARLIER = {"first_picture": "… the recoil's first picture alone"}  # before Ru
 RECORDINGS = {"bands": 3, "sealed": 1}
 BANDS = {"bands": SETS["bands"][:2], "sealed": (SPENT, tuple(rubbers(SPENT)))}  # seed, names
 OF_ORANGE = "orange", "orange_2", "orange_3"
-REPORT, PAGE = Path("reports/validation/attribution.json"), Path("docs/paper.md")
+WORK, REPORT = Path("data/attribution"), Path("reports/validation/attribution.json")
+PAGE = Path("docs/paper.md")
 COLUMNS = {  # of the table
     ("bands", "informative"): "rig bands, informative",
     ("bands", "paper"): "rig bands, the paper's pull",
@@ -94,11 +86,15 @@ class BandRecording:
     number: int
 
     @property
-    def params(self) -> Params:
+    def lab(self) -> Params:
+        """What the rig's own processes read: without the variants."""
         if self.group == "orange":
-            return with_variants(with_orange(load(DEFAULTS)))
-        seed = BANDS[self.group][0]
-        return with_variants(with_rubbers(load(DEFAULTS), seed, self.number, self.pull))
+            return with_orange(load(DEFAULTS))
+        return with_rubbers(load(DEFAULTS), BANDS[self.group][0], self.number, self.pull)
+
+    @property
+    def params(self) -> Params:
+        return with_variants(self.lab)
 
     def episode(self, work: Path, orange: Path | None) -> Path:
         """The folder of its episode and clamps, made where they are missing."""
@@ -147,11 +143,11 @@ def recoil_of(method: str) -> Iterator[None]:
     def later(rule: Rule, episode: Episode) -> np.ndarray:
         return counted(replace(rule, recoil=rule.latest), episode)
 
-    with ExitStack() as stack:
-        if method == "recoil_trusted_half":
-            stack.enter_context(mock.patch.object(Tolerances, "of", doubled))
-        if method == "later_pictures":
-            stack.enter_context(mock.patch.object(Rule, "frames", later))
+    changes = {
+        "recoil_trusted_half": (Tolerances, "of", doubled),
+        "later_pictures": (Rule, "frames", later),
+    }
+    with mock.patch.object(*changes[method]) if method in changes else nullcontext():
         yield
 
 
@@ -168,7 +164,7 @@ def identified(job: VariantJob, work: Path, orange: Path | None) -> dict:
     if job.group == "orange":
         scores = against_given(outcome, params, *landings(Path(orange or ".")))
     else:
-        file = saved(params_of_rig(job), folder / job.method / "params.yaml")
+        file = saved(job.lab, folder / job.method / "params.yaml")
         with World(job.band, file, workers=1) as world:
             scores = scored(outcome, params, world, seed=job.number)
     return {
@@ -176,11 +172,6 @@ def identified(job: VariantJob, work: Path, orange: Path | None) -> dict:
         "identified": outcome.identified,
         "settled": confidence.get("settled"),
     }
-
-
-def params_of_rig(job: VariantJob) -> Params:
-    """What the rig's own processes read: without the variants."""
-    return with_rubbers(load(DEFAULTS), BANDS[job.group][0], job.number, job.pull)
 
 
 def against_given(
@@ -202,10 +193,6 @@ def against_given(
     }
 
 
-def performed(job: VariantJob, work: Path, orange: Path | None) -> dict:
-    return result_of(job, partial(identified, job, work, orange))
-
-
 def figures(lines: list[dict]) -> dict:
     """Figures by group and pull: each method's `together`, and the mean errors of each band."""
     result: dict = {}
@@ -215,21 +202,14 @@ def figures(lines: list[dict]) -> dict:
             successes = [line for line in some if line["method"] == method and "failed" not in line]
             if not successes:
                 continue
-            unit = "number" if group == "orange" else "band"
-            names = dict.fromkeys(line[unit] for line in successes)
-            of_units = {
-                str(name): summary([line["scores"] for line in successes if line[unit] == name])
-                for name in names
-            }
+            of_units = summaries(successes, "number" if group == "orange" else "band")
             result.setdefault(f"{group}, {pull}", {})[method] = {
                 "together": together(of_units),
                 "recordings": len(successes),
                 "failed": sum(line["method"] == method for line in some) - len(successes),
-                "mean_bias": {
-                    name: unit_summary["mean_bias"] for name, unit_summary in of_units.items()
-                },
-                "coverage": {
-                    name: unit_summary["coverage"] for name, unit_summary in of_units.items()
+                **{
+                    figure: {name: of_unit[figure] for name, of_unit in of_units.items()}
+                    for figure in ("mean_bias", "coverage")
                 },
             }
     return plain(result, 4)
@@ -237,21 +217,18 @@ def figures(lines: list[dict]) -> dict:
 
 def block(content: dict) -> str:
     """What the page has between its marks."""
-    begin, end = marks("attribution")
     there = {", ".join(key): words for key, words in COLUMNS.items()}
-    heads = [f"{words} ({_units(content['figures'][key])})" for key, words in there.items()]
-    rows = ["| identified by | " + " | ".join(heads) + " |", "|---|" + "---:|" * len(heads)]
+    there = {key: words for key, words in there.items() if key in content["figures"]}
+    heads = [
+        f"{words} ({len(content['figures'][key][OURS]['mean_bias'])})"
+        for key, words in there.items()
+    ]
+    rows = [row("identified by", *heads), "|---|" + "---:|" * len(heads)]
     for method, words in (METHODS | EARLIER).items():
         figures_of = [content["figures"][key].get(method) for key in there]
-        if not any(figures_of):
-            continue
-        cells = list(map(_cell, figures_of))
-        rows.append(f"| {words} | " + " | ".join(cells) + " |")
-    return begin + "\n".join(rows) + "\n" + end
-
-
-def _units(of_methods: dict) -> int:
-    return len(of_methods[OURS]["mean_bias"])
+        if any(figures_of):
+            rows.append(row(words, *map(_cell, figures_of)))
+    return block_of("attribution", rows)
 
 
 def _cell(method_figures: dict | None) -> str:
@@ -265,36 +242,24 @@ def _cell(method_figures: dict | None) -> str:
     return text
 
 
-def main() -> int:
-    parser = runner.parser(__doc__, REPORT, Path("data/attribution"), minutes=True)
-    parser.add_argument("--page", action="store_true", help=f"only write into {PAGE}")
-    parser.add_argument("--orange", type=Path, help="the folder of its recordings and landings")
-    arguments = parser.parse_args()
-    if arguments.page:
-        content = json.loads(arguments.report.read_text(encoding="utf-8"))
-        write_text(PAGE, with_block(PAGE.read_text(encoding="utf-8"), block(content)))
-        return 0
-    work, orange = arguments.work.resolve(), arguments.orange and arguments.orange.resolve()
-    results, every = ResultLines(work / "results.jsonl"), recordings(orange)
+def main() -> None:
+    args = runner.parser(__doc__, REPORT, WORK, page=PAGE, orange=True).parse_args()
+    if args.page:
+        return fill(PAGE, block(read(args.report)))
+    folders, every = {"work": args.work, "orange": args.orange}, recordings(args.orange)
     todo = [
         VariantJob(**asdict(recording), method=method) for recording in every for method in METHODS
     ]
-    limits = arguments.workers, arguments.minutes
-    for _ in runner.each(partial(BandRecording.episode, work=work, orange=orange), every, *limits):
-        pass
-    runner.run(partial(performed, work=work, orange=orange), todo, results, *limits)
-    lines = results.among(todo)
-    command = "python -m validation.campaigns.attribution --orange FOLDER"
-    report = environment("cpu", command) | {
+    runner.prepare(args, partial(BandRecording.episode, **folders), every)
+    lines = runner.results_of(args, partial(identified, **folders), todo)
+    content = {
         "kind": "virtual",
         "jobs": [len(lines), len(todo)],
         "recordings_of_each_band": RECORDINGS,
         "pads": "open as fast as the recorded force fell, for every variant",
         "figures": figures(lines),
     }
-    write_json(arguments.report, report)
-    print(block(report))
-    return 0
+    print(block(write_report(args.report, content, "--orange FOLDER")))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ lines of results.jsonl: a run that was killed goes on from there.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -20,8 +19,6 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
-from pipeline.base.files import write_json
 from pipeline.params import Params, load
 from pipeline.recording.delays import Delays, correct_delays
 from pipeline.recording.input.reader import read_recording
@@ -29,8 +26,9 @@ from pipeline.recording.pulls import Pull
 from rig.draw import drawn
 from rig.recorder.record import record
 from validation.campaigns import runner
-from validation.campaigns.runner import ResultLines, plain, result_of
+from validation.campaigns.runner import made_once
 from validation.projects import DEFAULTS
+from validation.reports import plain, write_report
 from validation.rubbers import DEVELOP, with_rubbers
 
 WORK, REPORT = Path(".checkpoints/camera_clock"), Path("reports/validation/camera-clock.json")
@@ -60,11 +58,9 @@ class Recorded:
 def measured(job: Recorded, work: Path) -> dict:
     """What was found, and by how much it and its parts are off [s]."""
     path, params = work / f"{job.band}-{job.number}.mcap", job.params
+    work.mkdir(parents=True, exist_ok=True)
     truth = path.with_suffix(".json")
-    if not truth.exists():
-        work.mkdir(parents=True, exist_ok=True)
-        write_json(truth, {"slip": record(params, job.band, path).slip_time})
-    slip = json.loads(truth.read_text(encoding="utf-8"))["slip"]
+    slip = made_once(truth, lambda: {"slip": record(params, job.band, path).slip_time})["slip"]
     pull = Pull.of(read_recording(path, params.setup, params.episode.delays), params.setup)
     delays = correct_delays(pull.shifted(camera=-job.late), params)[1]
     latency = drawn(params, job.band).rig.pose_latency
@@ -88,14 +84,10 @@ def stated(delays: Delays, release: float) -> dict[str, float]:
     return {"pose": camera, "release": tied, "force": float(np.hypot(tied, release))}
 
 
-def performed(job: Recorded, work: Path) -> dict:
-    return result_of(job, partial(measured, job, work))
-
-
 def figures(lines: list[dict]) -> dict:
     """Errors [s] by what the camera's clock is held against, and how true those stated are."""
     good, result = [line for line in lines if "failed" not in line], {}
-    for name in ("pose", "release", "force"):
+    for name in ("pose", "release", "force") if good else ():
         off, stated_errors = (
             np.array([line[part][name] for line in good]) for part in ("off", "stated")
         )
@@ -112,13 +104,10 @@ def figures(lines: list[dict]) -> dict:
 
 
 def main() -> None:
-    parser = runner.parser(str(__doc__), REPORT, WORK, minutes=True)
-    args = parser.parse_args()
-    work, todo = args.work.resolve(), [Recorded(b, n) for n in range(TEN) for b in BANDS]
-    results = ResultLines(work / "results.jsonl")
-    runner.run(partial(performed, work=work), todo, results, args.workers, args.minutes)
-    lines = results.among(todo)
-    report = environment("cpu", "python -m validation.campaigns.camera_clock") | {
+    args = runner.parser(__doc__, REPORT, WORK).parse_args()
+    todo = [Recorded(band, number) for number in range(TEN) for band in BANDS]
+    lines = runner.results_of(args, partial(measured, work=args.work), todo)
+    content = {
         "kind": "virtual",
         "asked": "At most 0.3 ms rms over 30 recordings of the rig, and the stated error true"
         " within a factor of 1.5.",
@@ -127,8 +116,7 @@ def main() -> None:
         "figures": plain(figures(lines), 4),
         "recordings": plain(lines, 5),
     }
-    write_json(args.report, report)
-    for name, summary in report["figures"].items():
+    for name, summary in write_report(args.report, content)["figures"].items():
         print(name, summary)
 
 

@@ -27,11 +27,10 @@ from pathlib import Path
 
 from pipeline.base import errors
 from pipeline.base.code import ROOT, digests
-from pipeline.base.environment import environment
-from pipeline.base.files import write_json
 from validation.campaigns import runner
 from validation.campaigns.runner import Result, ResultLines
 from validation.projects import SLING, TINY, ProjectCopy, copy_project, run_of
+from validation.reports import write_report
 
 WORK, REPORT = Path("build/conditions"), Path("reports/validation/conditions.json")
 LIMIT = 900.0  # s for a command
@@ -71,12 +70,8 @@ REFUSED = {  # conditions in which one command cannot do what it is for
     ("no git", "reset"),
     ("no git", "dvc repro"),  # DVC itself wants Git, or to know
 }
-ROOTS = (
-    "read only project",
-    "project of another user",
-    "temporary folder full and noexec",
-    "no home and no name",
-)
+FIXED = "read only project", "project of another user"  # nothing can be written
+ROOTS = (*FIXED, "temporary folder full and noexec", "no home and no name")
 
 
 @dataclass(frozen=True)
@@ -197,8 +192,7 @@ def expected(cell: Cell) -> bool:
     """Whether the command is to succeed."""
     if cell.command == "verify" or (cell.condition, cell.command) in REFUSED:
         return False
-    fixed = cell.condition in ("read only project", "project of another user")
-    return cell.command in SHOW or not fixed
+    return cell.command in SHOW or cell.condition not in FIXED
 
 
 def template(work: Path) -> Path:
@@ -260,12 +254,11 @@ def run(cell: Cell, work: Path) -> Result:
         )  # fmt: skip
         status = ended(process, log)
     text = log.read_text(encoding="utf-8", errors="replace")
-    faults = faults_of(cell, status, text)
+    faults, lines = faults_of(cell, status, text), errors_in(text)
     if not expected(cell) and (changed := changes(at.copy)):
         faults.append(f"Git sees {changed}")
     if not faults:
         shutil.rmtree(folder)
-    lines = [line for line in text.splitlines() if line.lower().startswith("error: ")]
     seconds = round(time.monotonic() - start, 1)
     summary = [line.replace(str(folder), "...") for line in lines[-1:]]
     return vars(cell) | {"status": status, "seconds": seconds, "said": summary, "faults": faults}
@@ -288,8 +281,7 @@ def ended(process: subprocess.Popen, log: Path) -> int | None:
 
 def faults_of(cell: Cell, status: int | None, text: str) -> list[str]:
     """What is wrong with how a command ended, and with what it said."""
-    lines = [line for line in text.splitlines() if line.lower().startswith("error: ")]
-    faults = []
+    lines, faults = errors_in(text), []
     if (status == 0) != expected(cell) or (status not in (0, 1) and cell.command != "dvc repro"):
         faults.append(f"status {status}: {text[-RELEASE_ERROR:]}")
     if "Traceback" in text:
@@ -301,14 +293,17 @@ def faults_of(cell: Cell, status: int | None, text: str) -> list[str]:
     return faults
 
 
+def errors_in(text: str) -> list[str]:
+    return [line for line in text.splitlines() if line.lower().startswith("error: ")]
+
+
 def changes(copy: Path) -> str:
     """What Git sees, in a line; nothing where there is no Git."""
     if not (copy / ".git").is_dir():
         return ""
-    requested = ["git", "-c", "safe.directory=*", "status", "--porcelain"]
-    return " ".join(
-        subprocess.run(requested, cwd=copy, capture_output=True, text=True).stdout.split()
-    )
+    words = ["git", "-c", "safe.directory=*", "status", "--porcelain"]
+    done = subprocess.run(words, cwd=copy, capture_output=True, text=True)
+    return " ".join(done.stdout.split())
 
 
 def report(results: list[Result]) -> dict:
@@ -324,13 +319,14 @@ def report(results: list[Result]) -> dict:
 
 
 def main() -> int:
-    options = runner.parser(__doc__ or "", REPORT, WORK)
+    options = runner.parser(__doc__, REPORT, WORK)
     options.add_argument("--only", metavar="WORD", default="", help="cells with it in their names")
     given = options.parse_args()
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a shell's background
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    work = given.work.resolve()
-    template(work)
+    work, end = given.work.resolve(), time.monotonic() + 60 * given.minutes
+    if not given.report_only:
+        template(work)
     lines = ResultLines(work / "results.jsonl")
     conditions, left = [*CONDITIONS], [] if os.geteuid() == 0 else [*ROOTS]
     if left:
@@ -342,21 +338,20 @@ def main() -> int:
     there = lines.of(Cell)
 
     def run_cell(cell: Cell) -> None:
-        if cell not in there or there[cell]["faults"]:
+        wanted = cell not in there or there[cell]["faults"]
+        if wanted and not given.report_only and time.monotonic() < end:
             lines.add(result := run(cell, work))
-            print(
-                f"{cell.condition}: {cell.command}: {result['faults'] or 'as expected'}", flush=True
-            )
+            outcome = result["faults"] or "as expected"
+            print(f"{cell.condition}: {cell.command}: {outcome}", flush=True)
 
     with ThreadPoolExecutor(given.workers) as pool:
         for _ in pool.map(run_cell, cells):  # raises what a cell raises
             pass
-    results = [lines.of(Cell)[cell] for cell in cells]
-    if not given.only and not left:
-        provenance = environment("cpu", "python -m validation.campaigns.conditions")
+    results = runner.expect(lines.among(cells), work)
+    if not given.only and not left and len(results) == len(cells):
         code = digests(Path(__file__), ROOT / "app/cli.py")
-        write_json(given.report, provenance | {"code": code} | report(results))
-    return int(any(result["faults"] for result in results))
+        write_report(given.report, report(results) | {"code": code})
+    return int(len(results) < len(cells) or any(result["faults"] for result in results))
 
 
 if __name__ == "__main__":

@@ -3,8 +3,7 @@
 A campaign writes its file before it asserts, so that a claim that fails leaves its figures too.
 """
 
-from collections.abc import Callable, Iterable
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
 
@@ -12,8 +11,8 @@ from pipeline.base.code import ROOT
 from pipeline.base.environment import environment
 from pipeline.base.files import write_json
 from pipeline.params import Params, load
-from validation.campaigns.runner import plain
 from validation.projects import DEFAULTS
+from validation.reports import plain
 
 
 @pytest.fixture(scope="session")
@@ -36,30 +35,14 @@ def progress(capsys) -> Callable[[str], None]:
 def record(request) -> Callable[..., None]:
     """Write reports/validation/<name>.json.
 
-    `code` in it has digests of what the campaign imports, and what `also`, scripts that it runs as
-    processes, do: `sling figures` tells which are older.
+    `code` in it has digests of what the campaign imports: `sling figures` tells which are older.
     """
 
-    def write(
-        name: str,
-        *,
-        requested: str,
-        met: bool,
-        settings: dict,
-        figures: dict,
-        also: Iterable[Path] = (),
-    ) -> None:
-        provenance = environment("cpu", "make validate", request.path, *also) | {
-            "alone": "python -m pytest -m validation -n 0"
-            f" validation/campaigns/{request.path.name}",
-        }
-        content = {
-            "asked": requested,
-            "met": met,
-            "settings": settings,
-            "figures": figures,
-            **provenance,
-        }
-        write_json(ROOT / "reports/validation" / f"{name}.json", plain(content, digits=5))
+    def write(name: str, *, requested: str, met: bool, settings: dict, figures: dict) -> None:
+        content = {"asked": requested, "met": met, "settings": settings, "figures": figures}
+        content |= environment("cpu", "make validate", request.path)
+        alone = f"python -m pytest -m validation -n 0 validation/campaigns/{request.path.name}"
+        path = ROOT / "reports/validation" / f"{name}.json"
+        write_json(path, plain(content | {"alone": alone}, digits=5))
 
     return write

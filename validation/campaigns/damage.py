@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Callable
 
 import numpy as np
 import zstandard
@@ -16,6 +17,7 @@ from mcap.opcode import Opcode
 from pipeline.recording.input.records import CHUNK as CHUNK_FIELDS
 from pipeline.recording.input.records import HEAD
 
+Damage = Callable[[bytes, np.random.Generator], bytes]
 CHUNK, MESSAGE = Opcode.CHUNK, Opcode.MESSAGE
 EXTREMES = [0, 1, 2, 255, 2**16, 2**31 - 1, 2**32 - 1, 2**40, 2**63 - 1, 2**63, 2**64 - 1]
 
@@ -69,29 +71,25 @@ def _bytes(content: bytes, random: np.random.Generator) -> bytes:
     return bytes(data)
 
 
-def _zeros(content: bytes, random: np.random.Generator) -> bytes:
-    a, b = _span(content, random)
-    return content[:a] + bytes(b - a) + content[b:]
+def _span_to(change: Callable[[bytes, np.random.Generator], bytes]) -> Damage:
+    """Put something in the place of a span."""
+
+    def damage(content: bytes, random: np.random.Generator) -> bytes:
+        a, b = _span(content, random)
+        return content[:a] + change(content[a:b], random) + content[b:]
+
+    return damage
 
 
-def _ones(content: bytes, random: np.random.Generator) -> bytes:
-    a, b = _span(content, random)
-    return content[:a] + b"\xff" * (b - a) + content[b:]
+_zeros = _span_to(lambda span, _: bytes(len(span)))
+_ones = _span_to(lambda span, _: b"\xff" * len(span))
+_cut_out = _span_to(lambda *_: b"")
+_insert = _span_to(lambda span, random: random.bytes(len(span)) + span)
 
 
 def _copy(content: bytes, random: np.random.Generator) -> bytes:
     (a, b), at = _span(content, random), _place(content, random)
     return content[:at] + content[a:b] + content[at:]
-
-
-def _cut_out(content: bytes, random: np.random.Generator) -> bytes:
-    a, b = _span(content, random)
-    return content[:a] + content[b:]
-
-
-def _insert(content: bytes, random: np.random.Generator) -> bytes:
-    a, b = _span(content, random)
-    return content[:a] + random.bytes(b - a) + content[a:]
 
 
 def _truncate(content: bytes, random: np.random.Generator) -> bytes:

@@ -13,7 +13,6 @@ alarm. Results are lines of results.jsonl in --work: a run that was killed goes 
 from __future__ import annotations
 
 import argparse
-import json
 import tempfile
 from collections import Counter
 from dataclasses import dataclass
@@ -22,16 +21,15 @@ from pathlib import Path
 
 import sling2sim2real as s2s
 from pipeline.base import errors
-from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json, write_text
-from pipeline.base.layout import made
 from pipeline.params import Params, load
 from validation import orange
 from validation.campaigns import runner
-from validation.campaigns.runner import ResultLines, plain, result_of
-from validation.marked import marks, with_block
+from validation.campaigns.runner import read
+from validation.marked import block_of, fill, row
+from validation.projects import with_section
 from validation.recordings.faults import FAULTS
+from validation.reports import write_report
 from validation.rubbers import DEVELOP, SPENT, rubbers, with_rubbers
 
 WORK, REPORT = Path("data/field"), Path("reports/validation/field.json")
@@ -63,10 +61,7 @@ def params_of(recording: str) -> tuple[Params, str]:
     band, _, seed = recording.partition("_")
     if band in RUBBERS:
         return with_rubbers(load(), RUBBERS[band], 0), band
-    params = load()
-    return params.model_copy(
-        update={"rig": params.rig.model_copy(update={"seed": int(seed)})}
-    ), band
+    return with_section(load(), "rig", seed=int(seed)), band
 
 
 def recorded(recording: str, work: Path, folder: Path | None) -> Path:
@@ -105,13 +100,8 @@ def checked(path: Path, recording: str) -> tuple[list[dict], s2s.Episode | None]
         text = str(error).removeprefix(f"{path}: ")
         return [{"about": "", "concern": "", "what": text, "refused": True}], None
     findings = [
-        {
-            "about": finding.about,
-            "concern": concern[finding.about],
-            "what": finding.what,
-            "refused": False,
-        }
-        for finding in done.findings
+        {"about": name, "concern": concern[name], "what": what, "refused": False}
+        for name, what in ((finding.about, finding.what) for finding in done.findings)
     ]
     return findings, episode_of(done, band, params)
 
@@ -172,9 +162,15 @@ def tried(case: Faulty, work: Path, folder: Path | None) -> dict:
         values = summary(identified(episode, case.recording, sound))
     except UserError as error:
         return {"findings": findings, "outcome": REFUSED, "identification": str(error)}
-    right = is_right(summary(sound), values)
-    outcome = CORRECT if right else MISNAMED if findings else SILENT
-    return {"findings": findings, "outcome": outcome, "values": values} | errors_of(sound, values)
+    right = summary(sound)
+    outcome = CORRECT if is_right(right, values) else MISNAMED if findings else SILENT
+    return {
+        "findings": findings,
+        "outcome": outcome,
+        "values": values,
+        "modulus_error": values["modulus"][0] / right["modulus"][0] - 1,
+        "damping_factor": values["damping"][0] / right["damping"][0],
+    }
 
 
 def is_right(sound: dict, values: dict) -> bool:
@@ -185,35 +181,20 @@ def is_right(sound: dict, values: dict) -> bool:
     return near and 1 / DAMPING <= factor <= DAMPING and held
 
 
-def errors_of(sound: s2s.Identification, values: dict) -> dict:
-    right = summary(sound)
-    return {
-        "modulus_error": values["modulus"][0] / right["modulus"][0] - 1,
-        "damping_factor": values["damping"][0] / right["damping"][0],
-    }
-
-
-def work_on(case: Faulty, work: Path, folder: Path | None) -> dict:
-    return result_of(case, partial(tried, case, work, folder))
-
-
 def cases_of(recordings: list[str], sound: list[str], faults: list[str]) -> list[Faulty]:
     """Middle sizes first, then the largest and the smallest sizes, then the sound recordings."""
 
     def of_size(place: int) -> list[Faulty]:
         return [Faulty(r, name, FAULTS[name].sizes[place]) for r in recordings for name in faults]
 
-    whole = [Faulty(fromkey, SOUND, 0.0) for fromkey in dict.fromkeys([*recordings, *sound])]
+    whole = [Faulty(name, SOUND, 0.0) for name in dict.fromkeys([*recordings, *sound])]
     return [*whole[:5], *of_size(1), *of_size(2), *of_size(0), *whole[5:]]
 
 
-def report(args: argparse.Namespace, cases: list[Faulty]) -> None:
-    """Write what the results in the work folder say."""
-    results: list[dict] = ResultLines(args.work / "results.jsonl").among(cases)
+def report(args: argparse.Namespace, cases: list[Faulty], results: list[dict]) -> None:
+    """Write what the results say."""
     sound = [result for result in results if result["fault"] == SOUND]
     faulty = [result for result in results if result["fault"] != SOUND]
-    if not results:
-        raise UserError(f"{args.work}: holds no result")
     alarms = [
         {"recording": result["recording"], **finding}
         for result in sound
@@ -231,9 +212,8 @@ def report(args: argparse.Namespace, cases: list[Faulty]) -> None:
         "counts": _counts(faulty),
         "families": {name: _family(faulty, name) for name in families},
         "results": results,
-        **environment("cpu", "python -m validation.campaigns.field --orange FOLDER"),
     }
-    write_json(args.report, plain(content, 5))
+    write_report(args.report, content, "--orange FOLDER", digits=5)
     print(f"{args.report}: {len(results)} of {len(cases)}, {content['counts']}", flush=True)
     print(f"{len(alarms)} false alarms on {len(sound)} sound recordings")
 
@@ -247,20 +227,18 @@ def _counts(results: list[dict]) -> dict[str, int]:
 
 def _family(results: list[dict], family: str) -> dict:
     """Counts of a class, and the largest errors that nothing of its concern reported."""
-    family_results = [result for result in results if FAULTS[str(result["fault"])].family == family]
-    passed = [result for result in family_results if "modulus_error" in result]
+    some = [result for result in results if FAULTS[result["fault"]].family == family]
+    passed = [result for result in some if "modulus_error" in result]
+    misses = [abs(result["modulus_error"]) for result in passed]
     factors = [max(result["damping_factor"], 1 / result["damping_factor"]) for result in passed]
-    return _counts(family_results) | {
-        "largest_modulus_error": max(
-            (abs(result["modulus_error"]) for result in passed), default=None
-        ),
+    return _counts(some) | {
+        "largest_modulus_error": max(misses, default=None),
         "largest_damping_factor": max(factors, default=None),
     }
 
 
 def block(content: dict) -> str:
     """What docs/recording.md has between its marks, of a report's content."""
-    begin, end = marks(BLOCK)
     rows = [
         "| class | tried | corrected | reported | wrong, another check spoke | silently wrong |"
         " largest undetected error of E, s·d |",
@@ -273,33 +251,26 @@ def block(content: dict) -> str:
         error, factor = figures["largest_modulus_error"], figures["largest_damping_factor"]
         largest = "–" if error is None else f"{100 * error:.1f} %, {factor:.2g} times"
         if tried:
-            rows.append(f"| {name} | {tried} | {' | '.join(map(str, counts))} | {largest} |")
+            rows.append(row(name, tried, *counts, largest))
     alarms = len(content["false_alarms"])
     rows += ["", f"False alarms on {content['sound_recordings']} sound recordings: {alarms}."]
-    return begin + "\n".join(rows) + "\n" + end
+    return block_of(BLOCK, rows)
 
 
 def main() -> None:
-    parser = runner.parser(str(__doc__), REPORT, WORK, minutes=True)
-    parser.add_argument("--orange", type=Path, help="folder of its recordings")
-    parser.add_argument("--report-only", action="store_true", help="of what is there")
-    parser.add_argument("--page", action="store_true", help=f"only write its table into {PAGE}")
+    parser = runner.parser(__doc__, REPORT, WORK, page=PAGE, orange=True)
     parser.add_argument("--faults", nargs="+", default=[*FAULTS], help="(default: all)")
     args = parser.parse_args()
     if args.page:
-        content = json.loads(made(args.report).read_text(encoding="utf-8"))
-        write_text(PAGE, with_block(PAGE.read_text(encoding="utf-8"), block(content)))
-        return
+        return fill(PAGE, block(read(args.report)))
     faulty = [name for name in FAULTY if args.orange or name not in ORANGE]
     sound = [*(ORANGE if args.orange else ()), *RIG, *(f"{name}_0" for name in RUBBERS)]
     cases = cases_of(faulty, sound, args.faults)
     if not args.report_only:
         for recording in faulty:  # whose identification the others start from
             start_of(recording, None, args.work, args.orange)
-        work = partial(work_on, work=args.work, folder=args.orange)
-        results = ResultLines(args.work / "results.jsonl")
-        runner.run(work, cases, results, args.workers, args.minutes)
-    report(args, cases)
+    work = partial(tried, work=args.work, folder=args.orange)
+    report(args, cases, runner.results_of(args, work, cases))
 
 
 if __name__ == "__main__":

@@ -8,14 +8,12 @@ Filled from reports/validation/ablations-large.json (validation/campaigns/ablati
 
 from __future__ import annotations
 
-import json
 import sys
-from pathlib import Path
 
 from pipeline.base.code import ROOT
 from pipeline.report.drawing.styles import styles
-from validation.campaigns.runner import PAPER
-from validation.marked import compared_or_fixed, marks, with_block
+from validation.campaigns.runner import PAPER, read
+from validation.marked import block_of, compared_or_fixed, row, with_block
 
 PAGE, REPORT = ROOT / "docs" / "paper.md", ROOT / "reports/validation/ablations-large.json"
 NAMES = {
@@ -27,7 +25,6 @@ NAMES = {
 
 def block(content: dict) -> str:
     """What the page has between its marks, of a report's content."""
-    begin, end = marks("findings")
     figures, rollouts = content["figures"]["all"], content["settings"]["rollouts"]
     methods, against = figures["methods"], figures[f"less_{PAPER}"]
     named = styles(methods)
@@ -39,19 +36,18 @@ def block(content: dict) -> str:
     for name in sorted(
         methods, key=lambda method: (method in NAMES, methods[method]["miss_cm"]["mean"])
     ):
-        row, less = methods[name], against.get(name)
-        miss, paper = row["miss_cm"], methods[PAPER]["miss_cm_each"]
+        of, less, paper = methods[name], against.get(name), methods[PAPER]["miss_cm_each"]
         cells = [NAMES.get(name, named[name].name), f"{rollouts[name]:,}"]
-        cells += [f"{row['loss']['mean']:.3f}", interval(miss, "{:.1f}")]
+        cells += [f"{of['loss']['mean']:.3f}", interval(of["miss_cm"], "{:.1f}")]
         if less:
-            each = [m > p for m, p in zip(row["miss_cm_each"], paper, strict=True)]
+            each = [m > p for m, p in zip(of["miss_cm_each"], paper, strict=True)]
             p = less["p_holm"]
             cells += [interval(less, "{:+.1f}"), "< 0.001" if p < 1e-3 else f"{p:.2g}"]
             cells.append(f"{sum(each)} of {len(each)}")
         else:
             cells += ["–", "–", "–"]
-        rows.append("| " + " | ".join(cells) + " |")
-    return begin + "\n".join(rows).replace(" -", " −").replace("(-", "(−") + "\n" + end
+        rows.append(row(*cells).replace(" -", " −").replace("(-", "(−"))
+    return block_of("findings", rows)
 
 
 def interval(estimate: dict, form: str) -> str:
@@ -61,7 +57,7 @@ def interval(estimate: dict, form: str) -> str:
 
 
 def drawn(page: str) -> str:
-    return with_block(page, block(json.loads(Path(REPORT).read_text(encoding="utf-8"))))
+    return with_block(page, block(read(REPORT)))
 
 
 if __name__ == "__main__":

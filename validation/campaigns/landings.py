@@ -17,23 +17,19 @@ without the recording, once results.jsonl is gone.
 
 from __future__ import annotations
 
-import argparse
-import json
 import shutil
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from textwrap import fill
+from textwrap import wrap
 
 import numpy as np
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
-from pipeline.base.files import write_json, write_text
+from pipeline.base.errors import UserError
 from pipeline.base.fingerprint import fingerprint
-from pipeline.base.machine import cores
 from pipeline.identify.posterior.launches import Observed
 from pipeline.params import Params, load
 from rig.oracle.world import World
@@ -45,15 +41,16 @@ from validation.campaigns.rig_scores import (
     saved,
     scored,
     sling_of,
-    summary,
+    summaries,
 )
-from validation.campaigns.runner import OURS, PAPER, ResultLines, plain, result_of
+from validation.campaigns.runner import OURS, PAPER, job_of, read
 from validation.density import Calibrated, calibrated_by
-from validation.marked import marks, with_block
-from validation.projects import DEFAULTS
+from validation.marked import block_of, fill, row
+from validation.projects import DEFAULTS, changed
+from validation.reports import plain, write_report
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
-PULLS = "paper", "informative"
+WORK, PULLS = Path(".checkpoints/landings"), ("paper", "informative")
 ONE_DIP = "one_dip"  # instead of plan.dips, which validation/campaigns/pulls.py has searched
 DIPS = Path("reports/validation/pulls.json")
 PAGE, README, BLOCK = Path("docs/identification.md"), Path("README.md"), "landings"
@@ -63,6 +60,7 @@ OTHERWISE: tuple[tuple[str, dict], ...] = (  # how the first recording of a band
     ("paper", {"method": PAPER}),
 )
 LINE = 125  # characters, of README.md
+TOLD = "parameters", "derived", "settled", "steps"  # what is kept of a confidence
 BANDS, TEN = ("band1", "band2", "band3"), 10
 BOOTSTRAP = 2000
 
@@ -96,15 +94,9 @@ class OneRecording:
     def params(self) -> Params:
         pull = "informative" if self.pull == ONE_DIP else self.pull
         params = with_rubbers(load(DEFAULTS), self.seed, self.number, pull, self.worn)
-        return params if pull == self.pull else with_one_dip(params)
-
-
-def with_one_dip(params: Params) -> Params:
-    """params.yaml with a single dip instead of its own."""
-    dips = json.loads(DIPS.read_text(encoding="utf-8"))["dips"][ONE_DIP]
-    content = params.model_dump(mode="json", exclude_unset=True)
-    content["plan"]["dips"] = dips
-    return Params.model_validate(content)
+        if pull == self.pull:
+            return params
+        return changed(params, {"plan.dips": read(DIPS)["dips"][ONE_DIP]})
 
 
 SETS = {
@@ -154,18 +146,13 @@ def identified(job: OneRecording, work: Path, keep: bool = False) -> dict:
         scores = scored(outcome, params, world, seed=job.number)
     if not keep:
         shutil.rmtree(folder)
-    reported = {
-        name: confidence.get(name) for name in ("parameters", "derived", "settled", "steps")
+    return {
+        "scores": scores,
+        "told": {name: confidence.get(name) for name in TOLD},
+        "delays": episode.metadata["preprocessing"].get("delays"),
+        "identification_s": seconds,
+        "cpu_s": time.process_time() - begin,
     }
-    return plain(
-        {
-            "scores": scores,
-            "told": reported,
-            "delays": episode.metadata["preprocessing"].get("delays"),
-            "identification_s": seconds,
-            "cpu_s": time.process_time() - begin,
-        }
-    )
 
 
 def measured(outcome: Calibrated, params: Params, world: World, number: int) -> list[Observed]:
@@ -177,40 +164,26 @@ def measured(outcome: Calibrated, params: Params, world: World, number: int) -> 
     return [Observed(tuple(draws[0].tolist()), params.trials.actuation_error, float(landing))]
 
 
-def performed(job: OneRecording, work: Path, keep: bool) -> dict:
-    return result_of(job, partial(identified, job, work, keep))
-
-
 def figures(lines: list[dict]) -> dict:
     """Figures by kind of recording: each band's `summary`, and what they say together."""
     result: dict = {}
-    kinds = {id(line): job_of(line).kind for line in lines}
-    for kind in sorted(set(kinds.values())):
-        some = [line for line in lines if kinds[id(line)] == kind]
-        good = [line for line in some if "failed" not in line]
+    kinds: dict[str, list[dict]] = {}
+    for line in lines:
+        kinds.setdefault(job_of(line, OneRecording).kind, []).append(line)
+    for kind, some in sorted(kinds.items()):
+        good, bad = (
+            [line for line in some if ("failed" in line) is lost] for lost in (False, True)
+        )
         if not good:
             continue
-        names = list(dict.fromkeys(line["band"] for line in good))
-        of_bands = {
-            name: summary([line["scores"] for line in good if line["band"] == name])
-            for name in names
-        }
+        of_bands = summaries(good, "band")
         result[kind] = {
             "together": together(of_bands),
             "settled": [sum(bool(line["told"]["settled"]) for line in good), len(good)],
-            "refused": {
-                f"{line['band']} {line['number']}": line["failed"]
-                for line in some
-                if "failed" in line
-            },
+            "refused": {f"{line['band']} {line['number']}": line["failed"] for line in bad},
             "bands": of_bands,
         }
     return plain(result)
-
-
-def job_of(line: dict) -> OneRecording:
-    """What a line of results is of."""
-    return OneRecording(**{field.name: line[field.name] for field in fields(OneRecording)})
 
 
 def brief(line: dict) -> dict:
@@ -250,7 +223,6 @@ WORDS = {"bands": "the rig's three bands", "develop": "four to develop on", "sea
 
 def block(contents: dict[str, dict]) -> str:
     """What the page has between its marks, of the reports of all sets."""
-    begin, end = marks(BLOCK)
     rows = [
         "| rubbers | recorded by | recordings | size of the bias, mean (worst) | launches inside"
         " (by bands drawn anew; least) | median width | fits that settled |",
@@ -272,17 +244,16 @@ def block(contents: dict[str, dict]) -> str:
                 cells.append(f"{shares[0]} ({low:.0f} to {high:.0f} %; {shares[1]})")
                 width = 100 * means["median_width"]
                 cells += [f"{width:.1f} %", f"{settled} of {count}"]
-            rows.append("| " + " | ".join(cells).replace("-", "−") + " |")
+            rows.append(row(*cells).replace("-", "−"))
     for name, words in WORDS.items():
         there, whole = contents[name]["jobs"]
         if there < whole:
             rows += ["", f"Of {words} {there} of {whole} identifications have run."]
-    return begin + "\n".join(rows) + "\n" + end
+    return block_of(BLOCK, rows)
 
 
 def sentence(content: dict) -> str:
     """What the README has between its marks, of the report of the sealed rubbers."""
-    begin, end = marks(BLOCK)
     means, bands = (content["figures"]["informative, virgin"][key] for key in ("together", "bands"))
     size, worst, inside, width = (
         100 * means[key] for key in ("mean_size_of_bias", "worst_bias", "coverage", "median_width")
@@ -299,50 +270,40 @@ def sentence(content: dict) -> str:
         f" intervals, which are {width:.0f} % of the distance wide. By the paper's pull they"
         f" are off by {ours:.1f} %, the paper's method by {theirs:.1f} %."
     )
-    return f"{begin}{fill(text, LINE)}\n{end}"
+    return block_of(BLOCK, wrap(text, LINE))
 
 
 def report_of(name: str) -> Path:
     return Path(f"reports/validation/landings-{name.replace('_', '-')}.json")
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+def main() -> None:
+    parser = runner.parser(__doc__, None, WORK, page=PAGE)
     parser.add_argument("set", choices=[*SETS, ONE_DIP])
-    parser.add_argument("--page", action="store_true", help=f"only write into {PAGE} and {README}")
-    parser.add_argument("--work", type=Path, default=Path(".checkpoints/landings"))
-    parser.add_argument("--workers", type=int, default=cores())
-    parser.add_argument("--minutes", type=float, default=1e4, help="then it ends; again: goes on")
-    parser.add_argument("--pulls", nargs="+", choices=PULLS, default=PULLS)
+    parser.add_argument("--pulls", nargs="+", choices=PULLS)
     parser.add_argument("--keep", action="store_true", help="the episodes, and take those kept")
-    parser.add_argument("--report", action="store_true", help="of what is there; nothing runs")
     parser.add_argument("--recordings", type=int, default=TEN, help="of each band, at most")
-    arguments = parser.parse_args()
-    if arguments.page:
-        contents = {name: json.loads(report_of(name).read_text("utf-8")) for name in SETS}
-        for page, text in ((PAGE, block(contents)), (README, sentence(contents["sealed"]))):
-            write_text(page, with_block(page.read_text(encoding="utf-8"), text))
-        return 0
-    work = arguments.work.resolve() / arguments.set
-    results, todo = (
-        ResultLines(work / "results.jsonl"),
-        jobs(arguments.set, arguments.recordings, arguments.pulls),
-    )
-    if not arguments.report:
-        limits = arguments.workers, arguments.minutes
-        runner.run(partial(performed, work=work, keep=arguments.keep), todo, results, *limits)
-    lines = results.among(todo)
-    command = f"python -m validation.campaigns.landings {arguments.set}"
-    report = environment("cpu", command) | {
+    args = parser.parse_args()
+    if args.page:
+        contents = {name: read(report_of(name)) for name in SETS}
+        fill(PAGE, block(contents))
+        return fill(README, sentence(contents["sealed"]))
+    if args.recordings < 1:
+        raise UserError("--recordings: from 1 on")
+    if args.pulls and args.set == ONE_DIP:
+        raise UserError(f"--pulls: {ONE_DIP} is a pull of its own")
+    args.work = args.work / args.set
+    todo = jobs(args.set, args.recordings, args.pulls or PULLS)
+    lines = runner.results_of(args, partial(identified, work=args.work, keep=args.keep), todo)
+    content = {
         "jobs": [len(lines), len(todo)],
         "plan.dips": [dict(dip) for dip in todo[0].params.plan.dips],
         "figures": figures(lines),
         "recordings": plain([brief(line) for line in lines], 4),
     }
-    write_json(report_of(arguments.set), report)
-    for name, row in report["figures"].items():
-        print(name, {key: value for key, value in row["together"].items()}, row["settled"])
-    return 0
+    report = write_report(args.report or report_of(args.set), content, args.set)
+    for name, some in report["figures"].items():
+        print(name, some["together"], some["settled"])
 
 
 if __name__ == "__main__":

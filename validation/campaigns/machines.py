@@ -15,7 +15,6 @@ writes reports/validation/twice.json.
 
 from __future__ import annotations
 
-import argparse
 import os
 import time
 from collections.abc import Sequence
@@ -28,9 +27,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
 from pipeline.base.errors import UserError, one_line
-from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.layout import Layout, made
 from pipeline.base.machine import named, processor
@@ -42,8 +39,11 @@ from pipeline.identify.results.mounting import sling_of_method
 from pipeline.params import Params, expect_known, load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
+from validation.campaigns import runner
 from validation.campaigns.runner import OURS, PAPER
 from validation.density import calibrated_by
+from validation.marked import row
+from validation.reports import plain, write_report
 
 FOLDER, TWICE = Path("reports/validation/machines"), Path("reports/validation/twice.json")
 COMMITTED, TABLE = Path(), Path("reports/tables/table1.csv")
@@ -94,17 +94,16 @@ def identified(band: str, method: str, root: Path, device: str) -> dict:
     seconds = time.perf_counter() - start
     loss = EpisodeLoss.of(params, method, episode, sling)
     terms = loss.terms(interact(sling, episode, outcome.theta, device=devices[0], fetch=False))
-    total = float(loss.total(terms)[0])
     landed = launch(sling, outcome.setup, outcome.theta, np.array(DRAWS), device=devices)
-    return {
-        "theta": outcome.identified,
-        "loss": total if np.isfinite(total) else None,
-        "landing": [
-            landing if np.isfinite(landing) else None for landing in landed.landing_y.tolist()
-        ],
-        "failure": landed.failure,
-        "seconds": seconds,
-    }
+    return plain(
+        {
+            "theta": outcome.identified,
+            "loss": loss.total(terms)[0],
+            "landing": landed.landing_y,
+            "failure": landed.failure,
+            "seconds": seconds,
+        }
+    )
 
 
 def measure(bands: Sequence[str], root: Path, device: str) -> dict:
@@ -145,9 +144,7 @@ def compared(reports: dict[str, MachineReport]) -> tuple[list[str], bool]:
         if _comparable(reports[first], what) != _comparable(reports[other], what):
             raise UserError(f"{first} and {other}: of different {what}, which nobody can compare")
     lines = ["| machine | processor | device |", "|---|---|---|"]
-    lines += [
-        f"| {n} | {report.processor} | {report.device_name} |" for n, report in reports.items()
-    ]
+    lines += [row(n, report.processor, report.device_name) for n, report in reports.items()]
     lines += ["", "| band | method | machine | E [kPa] | loss | landings, off the first | time |"]
     lines += ["|---|---|---|---:|---:|---:|---:|"]
     bands, largest = reports[first].bands, dict.fromkeys((OURS, PAPER), 0.0)
@@ -231,18 +228,13 @@ def twice(run: Path, other: Path) -> dict:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument(
-        "--report", type=Path, help=f"file to write (of --twice, by default: {TWICE})"
-    )
+    parser = runner.parser(__doc__, None)
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--compare", type=Path, nargs="+", metavar="JSON", help="of machines")
     what.add_argument("--twice", type=Path, nargs=2, metavar="RUN", help="folders of whole runs")
     parser.add_argument("--project", type=Path, default=Path(), help="folder (default: this)")
     parser.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
-    parser.add_argument(
-        "--bands", nargs="+", default=(), help="(default: those of params.yaml's `run`)"
-    )
+    parser.add_argument("--bands", nargs="+", default=(), help="(default: those that run)")
     args = parser.parse_args()
     if args.compare:
         reports = {path.stem: read_json(path, MachineReport) for path in args.compare}
@@ -250,18 +242,15 @@ def main() -> int:
         print(*lines, sep="\n")
         return 0 if met else 1
     if args.twice:
-        content, report = twice(*args.twice), args.report or TWICE
-        command = "python -m validation.campaigns.machines --twice RUN OTHER"
-        write_json(report, content | environment("cpu", command))
+        content = write_report(args.report or TWICE, twice(*args.twice), "--twice RUN OTHER")
         differing = content["differing"]
         print(*differing, f"{len(differing)} of {content['outputs']} outputs differ", sep="\n")
         return 1 if differing else 0
     if not args.report:
         raise UserError("--report FILE, --compare JSON JSON or --twice RUN OTHER is wanted")
     content = measure(args.bands, args.project, args.device)
-    command = f"python -m validation.campaigns.machines --device {args.device}"
-    command += f" --report {FOLDER / args.report.name}"
-    write_json(args.report, content | environment(args.device, command))
+    arguments = f"--device {args.device} --report {FOLDER / args.report.name}"
+    write_report(args.report, content, arguments, device=args.device)
     print(args.report)
     return 0
 

@@ -25,14 +25,14 @@ from pathlib import Path
 
 from pipeline.base import errors
 from pipeline.base.code import ROOT, digests
-from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
-from pipeline.base.files import replacing, write_json
+from pipeline.base.files import replacing
 from pipeline.base.fingerprint import fingerprint
 from validation.campaigns import outcomes, runner
 from validation.campaigns.outcomes import FAULT, HANGS, MOST, name_of
 from validation.campaigns.runner import Result, ResultLines
 from validation.recordings.small import CHECKED, CONTAINERS, FAMILIES, write_small
+from validation.reports import write_report
 
 WORK, REPORT = Path("build/mutations"), Path("reports/validation/mutations.json")
 LIBRARIES = ("mcap", "mcap-ros2-support", "mcap-protobuf-support", "rosbags", "protobuf")
@@ -187,7 +187,7 @@ def _named(result: Result) -> Result:
 
 
 def main() -> None:
-    parser = runner.parser(__doc__, REPORT, WORK, minutes=True)
+    parser = runner.parser(__doc__, REPORT, WORK)
     parser.add_argument("--count", type=int, default=20_000, help="recordings (default: 20000)")
     args = parser.parse_args()
     if min(args.count, args.workers) < 1:
@@ -207,11 +207,11 @@ def main() -> None:
             failed = len(faults([*lines.lines]))
             print(f"{len(lines.lines)}, {minutes:.1f} min: {failed} faults", flush=True)
 
-    run(lines.path.parent, parts, args.workers, on_result, start + 60 * args.minutes)
-    results = sorted(lines.lines, key=key)
-    command = f"python -m validation.campaigns.mutations --count {args.count}"
-    content = summary(results, args.count)
-    write_json(args.report, content | environment("cpu", f"{command} --workers {args.workers}"))
+    if not args.report_only:
+        run(lines.path.parent, parts, args.workers, on_result, start + 60 * args.minutes)
+    results = sorted(runner.expect(lines.lines, args.work), key=key)
+    arguments = f"--count {args.count} --workers {args.workers}"
+    write_report(args.report, summary(results, args.count), arguments)
     print(f"{args.report}: {len(results)} recordings, {len(faults(results))} faults", flush=True)
 
 

@@ -9,25 +9,23 @@ reports/validation/landings-outlier.json.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
-from pipeline.base.files import write_json
 from pipeline.params import Params, load
 from rig.oracle.world import World
 from validation.campaigns import runner
 from validation.campaigns.landings import report_of
 from validation.campaigns.rig_scores import recorded, saved, scored, sling_of, summary
-from validation.campaigns.runner import OURS, ResultLines, plain, result_of
+from validation.campaigns.runner import OURS, read
 from validation.density import calibrated_by
-from validation.projects import DEFAULTS
+from validation.projects import DEFAULTS, changed
+from validation.reports import write_report
 from validation.rubbers import SEALED, with_rubbers
 
-REPORT = Path("reports/validation/landings-outlier.json")
+WORK, REPORT = Path(".checkpoints/outlier"), Path("reports/validation/landings-outlier.json")
 USUAL = 0.0015  # s, of viscosity: within what the rubbers' seed draws
 CHANGES: dict[str, dict] = {
     "as it is": {},
@@ -46,15 +44,13 @@ class Changed:
     @property
     def params(self) -> Params:
         params = with_rubbers(load(DEFAULTS), SEALED, 0, "informative")
-        content = params.model_dump(mode="json", exclude_unset=True)
-        content["rig"]["bands"][self.band] |= CHANGES[self.change]
-        return Params.model_validate(content)
+        change = CHANGES[self.change].items()
+        return changed(params, {f"rig.bands.{self.band}.{key}": value for key, value in change})
 
 
 def farthest() -> str:
     """Name of the sealed rubber with the largest bias by dips."""
-    content = json.loads(report_of("sealed").read_text(encoding="utf-8"))
-    bands = content["figures"]["informative, virgin"]["bands"]
+    bands = read(report_of("sealed"))["figures"]["informative, virgin"]["bands"]
     return max(bands, key=lambda name: abs(bands[name]["mean_bias"]))
 
 
@@ -66,21 +62,14 @@ def identified(job: Changed, work: Path) -> dict:
     )
     with World(job.band, saved(params, folder / "params.yaml"), workers=1) as world:
         scores = scored(outcome, params, world, seed=0)
-    return plain({"scores": scores, "parameters": confidence["parameters"]})
-
-
-def performed(job: Changed, work: Path) -> dict:
-    return result_of(job, partial(identified, job, work))
+    return {"scores": scores, "parameters": confidence["parameters"]}
 
 
 def main() -> None:
-    parser = runner.parser(str(__doc__), REPORT, Path(".checkpoints/outlier"))
-    arguments = parser.parse_args()
-    work, band = arguments.work.resolve(), farthest()
-    results, todo = ResultLines(work / "results.jsonl"), [Changed(band, name) for name in CHANGES]
-    runner.run(partial(performed, work=work), todo, results, arguments.workers)
-    rows = {}
-    for line in results.among(todo):
+    args = runner.parser(__doc__, REPORT, WORK).parse_args()
+    band, rows = farthest(), {}
+    todo = [Changed(band, name) for name in CHANGES]
+    for line in runner.results_of(args, partial(identified, work=args.work), todo):
         if "failed" in line:
             rows[line["change"]] = {"failed": line["failed"]}
             continue
@@ -88,10 +77,7 @@ def main() -> None:
         loss = line["parameters"]["elasticity_damping"]
         rows[line["change"]] = figures | {"damping_s": [loss["low"], loss["high"]]}
         print(f"{line['change']}: bias {100 * figures['mean_bias']:+.1f} %", flush=True)
-    described = environment("cpu", "python -m validation.campaigns.outlier")
-    write_json(
-        arguments.report, plain({"band": band, "changes": CHANGES, "figures": rows}) | described
-    )
+    write_report(args.report, {"band": band, "changes": CHANGES, "figures": rows})
 
 
 if __name__ == "__main__":

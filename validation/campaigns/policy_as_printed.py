@@ -19,9 +19,7 @@ import numpy as np
 
 from pipeline.base import errors
 from pipeline.base.code import ROOT, digest
-from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.progress import Progress
 from pipeline.identify.results.theta import load_theta
@@ -35,19 +33,16 @@ from pipeline.policy.environment import projectile_start
 from pipeline.policy.train import train
 from validation.benchmarks.timing import timed
 from validation.campaigns import runner
-from validation.campaigns.runner import PAPER, ResultLines, plain
+from validation.campaigns.runner import PAPER, ResultLines
 from validation.paired import mean_interval
+from validation.reports import plain, write_report
 
 WORK = Path("data/policy_as_printed")
 REPORT = Path("reports/validation/policy-as-printed.json")
 USUAL = {"landings": "map", "exploration": "scheduled", "state": "target"}
 PRINTED = {"landings": "simulated", "exploration": "learned", "state": "projectile_target"}
 SWITCHES = {"usual": {}, **{name: {name: PRINTED[name]} for name in PRINTED}, "all": PRINTED}
-TRAINING = (
-    "pipeline/launching/surface",
-    "pipeline/policy",
-    "pipeline/simulator",
-)  # code that a result hangs on
+TRAINING = "pipeline/launching/surface", "pipeline/policy", "pipeline/simulator"  # a result's code
 SEEDS = 11, 12, 13  # that took part in no choice
 
 
@@ -124,15 +119,16 @@ def summary(results: list[dict]) -> dict:
 
 
 def _of_seeds(rows: list[dict]) -> dict:
-    errors_cm = 100 * np.array([row["error_m"] for row in rows], float)  # null becomes NaN
+    errors_cm, range_cm, last_cm = (
+        100 * np.array([row[name] for row in rows], float)  # null becomes NaN
+        for name in ("error_m", "range_mean_error_m", "last_error_m")
+    )
     return {
         "miss_cm": mean_interval(errors_cm.mean(axis=1)),
         "miss_cm_each": plain(errors_cm),  # a row for each seed
-        "range_miss_cm": mean_interval(
-            100 * np.array([row["range_mean_error_m"] for row in rows], float)
-        ),
+        "range_miss_cm": mean_interval(range_cm),
         "range_failures": sum(sum(row["range_failures"].values()) for row in rows),
-        "last_miss_cm": mean_interval(100 * np.array([row["last_error_m"] for row in rows], float)),
+        "last_miss_cm": mean_interval(last_cm),
         "std": [row["std"] for row in rows],
         "wall_s": mean_interval(np.array([row["wall_s"] for row in rows])),
     }
@@ -140,11 +136,10 @@ def _of_seeds(rows: list[dict]) -> dict:
 
 def main() -> None:
     params = load()
-    parser = runner.parser(__doc__, REPORT)
+    parser = runner.parser(__doc__, REPORT, WORK, many=False)
     parser.add_argument("--bands", nargs="+", default=list(params.run.bands))
     parser.add_argument("--method", default=PAPER, help=f"whose θ (default: {PAPER})")
     parser.add_argument("--seeds", nargs="+", type=int, default=SEEDS)
-    parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
     args = parser.parse_args()
     if min(args.seeds) < 1:
         raise UserError("--seeds: from 1 on")
@@ -160,14 +155,12 @@ def main() -> None:
     results = []
     for lesson in lessons:
         results.append(result(lesson, params, args.work, args.method))
-        write_report(args, params, results, len(lessons))
+        report(args, params, results, len(lessons))
 
 
-def write_report(
-    args: argparse.Namespace, params: Params, results: list[dict], wanted: int
-) -> None:
-    command = "python -m validation.campaigns.policy_as_printed"
-    command += f" --bands {' '.join(args.bands)} --method {args.method}"
+def report(args: argparse.Namespace, params: Params, results: list[dict], wanted: int) -> None:
+    """Write what there is."""
+    command = f"--bands {' '.join(args.bands)} --method {args.method}"
     content = {
         "kind": "virtual",
         "asked": "What each way to train as the paper prints it changes in |y - g| of the policy's"
@@ -185,9 +178,8 @@ def write_report(
         "done": len(results),
         "figures": summary(results),
         "results": results,
-        **environment("cpu", f"{command} --seeds {' '.join(map(str, args.seeds))}"),
     }
-    write_json(args.report, content)
+    write_report(args.report, content, f"{command} --seeds {' '.join(map(str, args.seeds))}")
     last = results[-1]
     line = f"{last['band']} {last['switch']} {last['seed']}: {last['error_m']}"
     print(f"{len(results)} of {wanted}, {line}", flush=True)

@@ -12,7 +12,6 @@ rubber's. The viscosity is given. There are no pictures.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,8 +20,6 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
-from pipeline.base.files import write_json
 from pipeline.base.machine import cores
 from pipeline.episode.planned import planned_pull
 from pipeline.identify.posterior.coordinates import PRIORS
@@ -33,8 +30,10 @@ from pipeline.params.lab import Dip
 from pipeline.simulator.model import ClampedBand
 from rig.physics import world
 from rig.physics.rubber import Rubber
+from validation.campaigns import runner
 from validation.projects import DEFAULTS
 from validation.real import fits
+from validation.reports import write_report
 from validation.rubbers import DEVELOP, rubbers, with_rubbers
 
 REPORT = Path("reports/validation/pulls.json")
@@ -173,9 +172,7 @@ def judged(params: Params, name: str, pulls: dict[str, Sequence[Dip]]) -> dict:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
-    args = parser.parse_args()
+    args = runner.parser(__doc__, REPORT).parse_args()
     params = with_rubbers(load(DEFAULTS), DEVELOP, 0)
     plan = params.plan
     limits = PullLimits(plan.max_speed, plan.max_acceleration, SPARE)
@@ -186,22 +183,17 @@ def main() -> None:
 
     chosen = searched(design_of(USUAL, params.setup.max_force / 2), limits)
     pulls = {"paper": (), "one_dip": ONE_DIP, "searched": chosen, "by_hand": BY_HAND}
-    rubber_rows = {}
+    every, off = {}, {}
     for name in rubbers(DEVELOP):
         design = design_of(name, params.rig.bands[name].peak_force)
-        rubber_rows[name] = judged(params, name, pulls)
-        for pull, rows in rubber_rows[name].items():
-            summary = 100 * 1.645 * np.sqrt(design.variances(pulls[pull]).mean())
-            rows["expected_half_width_percent"] = round(float(summary), 2)
-        print(
-            name, {pull: row["mean_abs_error_percent"] for pull, row in rubber_rows[name].items()}
-        )
+        every[name] = judged(params, name, pulls)
+        for pull, row in every[name].items():
+            half = 100 * 1.645 * np.sqrt(design.variances(pulls[pull]).mean())
+            row["expected_half_width_percent"] = round(float(half), 2)
+        off[name] = {pull: row["mean_abs_error_percent"] for pull, row in every[name].items()}
+        print(name, off[name])
     mean = {
-        pull: round(
-            float(np.mean([rows[pull]["mean_abs_error_percent"] for rows in rubber_rows.values()])),
-            2,
-        )
-        for pull in pulls
+        pull: round(float(np.mean([rubber[pull] for rubber in off.values()])), 2) for pull in pulls
     }
     content = {
         "kind": "one number of stretch, virtual rubbers",
@@ -209,9 +201,9 @@ def main() -> None:
         "mean_abs_error_percent": mean,
         "searched_dips_are_better": mean["searched"] < 0.9 * mean["one_dip"],
         "dips": {name: [dip.model_dump() for dip in dips] for name, dips in pulls.items()},
-        "rubbers": rubber_rows,
+        "rubbers": every,
     }
-    write_json(args.report, content | environment("cpu", "python -m validation.campaigns.pulls"))
+    write_report(args.report, content)
     print(f"{mean}; wrote {args.report}")
 
 

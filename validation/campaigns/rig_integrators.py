@@ -10,7 +10,6 @@ tolerance. Writes reports/validation/rig-integrators.json.
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -23,8 +22,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
-from pipeline.base.files import write_json
 from pipeline.params import Params, load
 from rig.physics import forces
 from rig.physics.forces import NEAR
@@ -33,6 +30,9 @@ from rig.physics.motion import HandMotion
 from rig.physics.string import ElasticString
 from rig.physics.world import string_of
 from rig.recorder.interaction import Interaction, hang, pull_and_release
+from validation.campaigns import runner
+from validation.projects import with_section
+from validation.reports import write_report
 
 REPORT = Path("reports/validation/rig-integrators.json")
 BAND = "band1"
@@ -125,10 +125,8 @@ def by_lsoda(rtol: float) -> Iterator[None]:
 def rubber(params: Params, changes: dict[str, Any]) -> Params:
     """Params with another rubber of BAND's."""
     band = params.rig.bands[BAND]
-    bands = params.rig.bands | {
-        BAND: type(band).model_validate(band.model_dump() | changes),
-    }
-    return params.model_copy(update={"rig": params.rig.model_copy(update={"bands": bands})})
+    other = type(band).model_validate(band.model_dump() | changes)
+    return with_section(params, "rig", bands=params.rig.bands | {BAND: other})
 
 
 def pulled(string: ElasticString, hanging: np.ndarray, params: Params) -> Interaction:
@@ -156,12 +154,10 @@ def apart(interaction: Interaction, other: Interaction) -> dict[str, float]:
     far = np.linalg.norm(interaction.lines - other.lines, axis=-1).max(axis=1)
     slipped = interaction.seen > max(interaction.slip_time, other.slip_time)
     held = interaction.seen < min(interaction.slip_time, other.slip_time)
+    # where both hold the band or neither does
+    alike = (interaction.force != 0).any(axis=1) == (other.force != 0).any(axis=1)
     return {
-        "force_n": float(
-            np.linalg.norm(interaction.force - other.force, axis=-1)[
-                _both(interaction, other)
-            ].max()
-        ),
+        "force_n": float(np.linalg.norm(interaction.force - other.force, axis=-1)[alike].max()),
         "hand_m": float(np.linalg.norm(interaction.hand - other.hand, axis=-1).max()),
         "slip_s": abs(interaction.slip_time - other.slip_time),
         "nodes_held_m": float(far[held].max()),
@@ -169,18 +165,12 @@ def apart(interaction: Interaction, other: Interaction) -> dict[str, float]:
     }
 
 
-def _both(interaction: Interaction, other: Interaction) -> np.ndarray:
-    """Mask of the sensor's times at which both hold the band or neither does."""
-    return (interaction.force != 0).any(axis=1) == (other.force != 0).any(axis=1)
-
-
 def compared(params: Params, draws: np.ndarray = DRAWS) -> dict[str, Any]:
     """CVODE, CVODE at a tighter tolerance, and LSODA, on a rubber."""
     string = string_of(params, BAND)
     results: dict[str, tuple[Interaction, np.ndarray, float]] = {}
     hanging = hang(string, params.rig.tolerance)
-    rig = params.rig.model_copy(update={"tolerance": TIGHTER})
-    tighter = params.model_copy(update={"rig": rig})
+    tighter = with_section(params, "rig", tolerance=TIGHTER)
     for name, its in (("cvode", params), ("tighter_cvode", tighter), ("lsoda", params)):
         begin = time.process_time()
         with by_lsoda(TIGHT) if name == "lsoda" else ExitStack():
@@ -204,30 +194,29 @@ def report(params: Params, rubbers: dict[str, dict[str, Any]]) -> dict[str, Any]
     most = {
         what: max(row["cvode_against_lsoda"][what] for row in rubbers.values()) for what in ASKED
     }
-    provenance = environment("cpu", "python -m validation.campaigns.rig_integrators")
-    versions = {name: version(name) for name in ("scikit-sundae", "numba")}
-    return provenance | {
-        "versions": provenance["versions"] | versions,
+    missed = sorted(what for what, limit in ASKED.items() if most[what] > limit)
+    return {
         "asked": "CVODE at rig.tolerance agrees with LSODA at 1e-8 on the same rates:"
         " force, nodes while held and while they swing slack, landing.",
         "limits": ASKED,
         "tolerance": {"cvode": params.rig.tolerance, "lsoda": TIGHT, "tighter_cvode": TIGHTER},
         "rubbers": {name: {"rig.bands": RUBBERS[name], **row} for name, row in rubbers.items()},
         "most": most,
-        "missed": sorted(what for what, limit in ASKED.items() if most[what] > limit),
-        "met": all(most[what] <= limit for what, limit in ASKED.items()),
+        "missed": missed,
+        "met": not missed,
     }
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.parse_args()
-    params, rubbers = load(), {}
+    args, params, rubbers = runner.parser(__doc__, REPORT).parse_args(), load(), {}
+    versions = {name: version(name) for name in ("scikit-sundae", "numba")}
     for name, changes in RUBBERS.items():
         rubbers[name] = compared(rubber(params, changes))
         print(f"{name}: {rubbers[name]}", flush=True)
-        write_json(REPORT, written := report(params, rubbers))
-    print(f"{REPORT}: {'met' if written['met'] else 'missed: ' + ', '.join(written['missed'])}")
+        written = write_report(args.report, report(params, rubbers), versions=versions)
+    print(
+        f"{args.report}: {'met' if written['met'] else 'missed: ' + ', '.join(written['missed'])}"
+    )
 
 
 if __name__ == "__main__":

@@ -89,12 +89,7 @@ class RigIdentification:
 
 
 def identified(
-    params: Params,
-    band: str,
-    method: str,
-    seed: int,
-    folder: Path,
-    recorded_pads: bool = False,
+    params: Params, band: str, method: str, seed: int, folder: Path, recorded_pads: bool = False
 ) -> RigIdentification:
     """Identify the episode in `folder` with a seed of the search. Raises UserError.
 
@@ -186,16 +181,23 @@ def summary(results: list[dict]) -> dict:
         np.array([result[name] for result in results], float)
         for name in ("error", "miss", "low", "high")
     )
-    confidence = np.isfinite(low) & np.isfinite(miss)
-    inside = np.array([result["inside"] for result in results])[confidence]
+    finite = np.isfinite(low) & np.isfinite(miss)
+    inside = np.array([result["inside"] for result in results])[finite]
+    width = ((high - low) / targets)[finite]
     return {
         "bias": np.nanmean(error, axis=1),
         "mean_bias": np.nanmean(error),
         "mean_miss_m": np.nanmean(np.abs(miss)),
         "failed": int(np.isnan(error).sum()),
-        "coverage": inside.mean() if confidence.any() else np.nan,
-        "launches": int(confidence.sum()),
-        "median_width": np.nanmedian(((high - low) / targets)[confidence])
-        if confidence.any()
-        else np.nan,
+        "coverage": inside.mean() if finite.any() else np.nan,
+        "launches": int(finite.sum()),
+        "median_width": np.nanmedian(width) if finite.any() else np.nan,
+    }
+
+
+def summaries(lines: list[dict], unit: str) -> dict[str, dict]:
+    """Summarise lines of results with "scores" by what each has as `unit`, such as its band."""
+    return {
+        str(name): summary([line["scores"] for line in lines if line[unit] == name])
+        for name in dict.fromkeys(line[unit] for line in lines)
     }

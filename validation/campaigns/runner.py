@@ -1,4 +1,4 @@
-"""What campaigns of many jobs share: results that outlive a kill, processes, and the report.
+"""What campaigns of many jobs share: arguments, results that outlive a kill, and processes.
 
 A job is a frozen dataclass; its result is a line of JSON with the job's fields in it. A run that
 was killed reads the lines that are there and goes on with the other jobs.
@@ -13,17 +13,18 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import fields
+from functools import partial
 from multiprocessing import active_children
 from pathlib import Path
 from threading import Lock
 from typing import TypeVar
 
-import numpy as np
-
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
+from pipeline.base.layout import made
 from pipeline.base.machine import cores
 from pipeline.base.pool import Pool
+from validation.reports import plain
 
 THREADS = ("SLING_WORKERS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 OURS, PAPER = "least_squares", "sling2sim2real"  # methods of params.yaml
@@ -54,8 +55,7 @@ class ResultLines:
 
     def of(self, kind: type[Job]) -> dict[Job, Result]:
         """Results by job, each as it was written last."""
-        names = [field.name for field in fields(kind)]
-        return {kind(*(line[name] for name in names)): line for line in self.lines}
+        return {job_of(line, kind): line for line in self.lines}
 
     def among(self, jobs: Iterable[object]) -> list[Result]:
         """Results of those of some jobs of one kind that have one, in the order of the jobs."""
@@ -66,6 +66,11 @@ class ResultLines:
     def where(self, **values: object) -> list[Result]:
         """Lines with these values."""
         return [line for line in self.lines if all(line[name] == v for name, v in values.items())]
+
+
+def job_of(line: Result, kind: type[Job]) -> Job:
+    """What a line of results is of."""
+    return kind(*(line[field.name] for field in fields(kind)))
 
 
 @contextmanager
@@ -81,12 +86,9 @@ def single_threaded() -> Iterator[None]:
 
 
 def each(
-    work: Callable[[Job], Result | None],
-    jobs: Iterable[Job],
-    workers: int,
-    minutes: float = 1e4,
-) -> Iterator[tuple[Job, Result | None]]:
-    """Jobs and what `work` makes of them as they are done, one a process with one thread.
+    work: Callable[[Job], object], jobs: Iterable[Job], workers: int, minutes: float = 1e4
+) -> Iterator[object]:
+    """What `work` makes of jobs, as they are done, one a process with one thread.
 
     Ends early, and says so, when the time is over: what is under way then is lost. Raises what
     `work` raises.
@@ -96,7 +98,7 @@ def each(
         try:
             for count, done in enumerate(as_completed(waiting, timeout=60 * minutes), 1):
                 print(f"{count} of {len(waiting)}: {waiting[done]}", flush=True)
-                yield waiting[done], done.result()
+                yield done.result()
         except TimeoutError:
             print("the time is over; run it again to go on", flush=True)
             for process in active_children():
@@ -106,22 +108,24 @@ def each(
 
 
 def run(
-    work: Callable[[Job], Result],
+    work: Callable[[Job], Mapping],
     jobs: Sequence[Job],
     results: ResultLines,
     workers: int,
     minutes: float = 1e4,
+    **more: object,
 ) -> None:
-    """Add the results of jobs that have none yet, until the time is over."""
+    """Add results of jobs that have none yet, with `more` in each, until the time is over."""
     there = results.of(type(jobs[0])) if jobs else {}
-    for _, result in each(work, [job for job in jobs if job not in there], workers, minutes):
+    todo = [job for job in jobs if job not in there]
+    for result in each(partial(result_of, work=work, **more), todo, workers, minutes):
         results.add(result)
 
 
-def result_of(job: object, work: Callable[[], Mapping], **more: object) -> Result:
+def result_of(job: object, work: Callable[[object], Mapping], **more: object) -> Result:
     """A job's result as JSON has it; that no simulation can follow the recording is one too."""
     try:
-        done = work()
+        done = work(job)
     except UserError as error:
         done = {"failed": str(error)}
     return plain(vars(job) | more | done)
@@ -131,34 +135,73 @@ def made_once(path: Path, make: Callable[[], object]):
     """The content of a JSON file, which is made where it is missing."""
     if not path.exists():
         write_json(path, make())
-    return json.loads(path.read_text(encoding="utf-8"))
+    return read(path)
 
 
-def plain(value: object, digits: int | None = None):
-    """Convert for JSON: NumPy's numbers to Python's, not finite to null; floats to some digits."""
-    if isinstance(value, dict):
-        return {str(key): plain(part, digits) for key, part in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [plain(part, digits) for part in value]
-    if isinstance(value, (float, np.floating)):
-        if not np.isfinite(value):
-            return None
-        return float(value) if digits is None else float(f"{value:.{digits}g}")
-    return value.item() if isinstance(value, np.generic) else value
+def read(path: Path):
+    """The content of a JSON file. Raises NotMade."""
+    return json.loads(made(path).read_text(encoding="utf-8"))
 
 
 def parser(
-    doc: str, report: Path, work: Path | None = None, minutes: bool = False
+    doc: str | None,
+    report: Path | None,
+    work: Path | None = None,
+    *,
+    many: bool = True,
+    page: Path | None = None,
+    orange: bool = False,
 ) -> argparse.ArgumentParser:
-    """A campaign's arguments: --report; of many jobs --workers and --work; and --minutes."""
-    options = argparse.ArgumentParser(description=doc.partition("\n")[0])
-    options.add_argument("--report", type=Path, default=report, help=f"(default: {report})")
+    """A campaign's arguments.
+
+    Args:
+        doc: Of the script; its first line says what it is for.
+        report: Default of --report; None: by what is asked for.
+        work: Default of --work, the folder of what is kept.
+        many: With --workers, --minutes and --report-only, for many jobs in that folder.
+        page: With --page, which writes into this one alone.
+        orange: With --orange, the folder of recordings that this project did not make.
+    """
+    options = argparse.ArgumentParser(description=(doc or "").partition("\n")[0])
+    default = f"file (default: {report or 'by what is asked for'})"
+    options.add_argument("--report", type=Path, default=report, help=default)
     if work is not None:
         options.add_argument("--work", type=Path, default=work, help=f"folder (default: {work})")
-        options.add_argument(
-            "--workers", type=int, default=cores(), help="processes (default: cores)"
-        )
-    if minutes:
-        end = "then it ends; the same command goes on"
+    if work is not None and many:
+        workers, end = "processes (default: cores)", "then it ends; the same command goes on"
+        options.add_argument("--workers", type=int, default=cores(), help=workers)
         options.add_argument("--minutes", type=float, default=1e4, help=end)
+        options.add_argument("--report-only", action="store_true", help="of what is there")
+    if page is not None:
+        options.add_argument("--page", action="store_true", help=f"only write into {page}")
+    if orange:
+        options.add_argument("--orange", type=Path, help="folder of its recordings and landings")
     return options
+
+
+def prepare(args: argparse.Namespace, work: Callable[[Job], object], jobs: Sequence[Job]) -> None:
+    """Make what other jobs need, unless --report-only. Raises UserError when the time is over."""
+    if not args.report_only:
+        count = sum(1 for _ in each(work, jobs, args.workers, args.minutes))
+        if count < len(jobs):
+            raise UserError(f"--minutes: only {count} of {len(jobs)} are prepared")
+
+
+def results_of(
+    args: argparse.Namespace, work: Callable[[Job], Mapping], jobs: Sequence[Job], **more: object
+) -> list[Result]:
+    """Results of jobs by a campaign's arguments. Raises UserError where there is none.
+
+    Those that are missing are made first, until the time is over; with --report-only they are not.
+    """
+    results = ResultLines(args.work / "results.jsonl")
+    if not args.report_only:
+        run(work, jobs, results, args.workers, args.minutes, **more)
+    return expect(results.among(jobs), args.work)
+
+
+def expect(results: Sequence[Job], work: Path) -> Sequence[Job]:
+    """Some results, of which there is one at least. Raises UserError."""
+    if not results:
+        raise UserError(f"{work}: holds no result of these jobs yet")
+    return results

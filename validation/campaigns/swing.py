@@ -12,26 +12,17 @@ meshes of what deviations.json has found with each, in the same recording.
 
 from __future__ import annotations
 
-import argparse
-import json
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
-from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
-from pipeline.base.layout import Layout, made
+from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.results.theta import (
-    calibrated,
-    launch_setup,
-    load_theta,
-    parameters_of,
-)
+from pipeline.identify.results.theta import calibrated, launch_setup, load_theta, parameters_of
 from pipeline.params import Params, load
 from pipeline.params.identification import parameter_names
 from pipeline.simulator.interaction import interact
@@ -39,8 +30,11 @@ from pipeline.simulator.launch import launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import THETA, Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
-from validation.campaigns.runner import OURS, PAPER
+from validation.campaigns import runner
+from validation.campaigns.runner import OURS, PAPER, read
 from validation.effects import AS_IS
+from validation.projects import with_section
+from validation.reports import write_report
 
 REPORT = Path("reports/validation/swing.json")
 DEVIATIONS = Path("reports/validation/deviations.json")
@@ -104,12 +98,11 @@ def by_mesh(params: Params, band: str, episode: Episode) -> dict:
             }
             for part, mean in done.mean.items()
         }
-    return {"own_damping_s": damping, "own_theta": theta.theta[0].tolist(), **rows}
+    return {"own_damping_s": damping, "own_theta": theta.theta[0], **rows}
 
 
 def sling_with(params: Params, band: str, mesh: str) -> ClampedBand:
-    section = params.sling.model_copy(update={"mesh": mesh})
-    return sling_of_method(params.model_copy(update={"sling": section}), band, PAPER)
+    return sling_of_method(with_section(params, "sling", mesh=mesh), band, PAPER)
 
 
 def as_found(params: Params, band: str, results: list[dict]) -> dict:
@@ -132,7 +125,7 @@ def as_found(params: Params, band: str, results: list[dict]) -> dict:
     first = next(iter(done.values()))
     return {
         name: {
-            "landing_m": launches.landing_y.tolist(),
+            "landing_m": launches.landing_y,
             "landing_ratio": (launches.landing_y / first.landing_y).mean(),
             "hold_force_ratio": (launches.hold_force / first.hold_force).mean(),
         }
@@ -173,10 +166,8 @@ def by_rounding(params: Params, band: str, method: str, episode: Episode) -> dic
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
-    args, params = parser.parse_args(), load()
-    results, bands = json.loads(made(DEVIATIONS).read_text(encoding="utf-8"))["results"], {}
+    args, params = runner.parser(__doc__, REPORT).parse_args(), load()
+    results, bands = read(DEVIATIONS)["results"], {}
     for band in params.run.bands:
         episode = Episode.load(Layout().episode(band))
         rounding = {method: by_rounding(params, band, method, episode) for method in (OURS, PAPER)}
@@ -191,15 +182,10 @@ def main() -> None:
         "kind": "virtual",
         "asked": "Which pictures tell the paper's loss of damping, in either mesh, and which hang"
         " on rounding.",
-        "settings": {
-            "parts_s": PARTS,
-            "draws_m": DRAWS.tolist(),
-            "relative_change": TINY,
-            "changes": TIMES,
-        },
+        "settings": {"parts_s": PARTS, "draws_m": DRAWS, "relative_change": TINY, "changes": TIMES},
         "bands": bands,
     }
-    write_json(args.report, content | environment("cpu", "python -m validation.campaigns.swing"))
+    write_report(args.report, content)
 
 
 if __name__ == "__main__":

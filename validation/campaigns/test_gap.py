@@ -27,7 +27,8 @@ from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.world import World
 from validation.campaigns.runner import OURS, PAPER
-from validation.campaigns.test_orange import copy_of_the_project, run
+from validation.campaigns.test_orange import copy_of_the_project
+from validation.projects import ProjectCopy
 
 pytestmark = pytest.mark.validation
 
@@ -84,14 +85,14 @@ def oracle_theta(launcher, box: SearchBox, draws: np.ndarray, landing: np.ndarra
     return dict(zip(box.names, box.to_physical(unit).tolist(), strict=True)), fit.fun
 
 
-def split(params: Params, root: Path, world: World, trials: tuple, method: str) -> dict:
+def split(params: Params, run: ProjectCopy, world: World, trials: tuple, method: str) -> dict:
     """What the error of one method on one band is made of.
 
     Args:
-        root: Where θ and policy are; the policy there is then trained anew, by the oracle's θ.
+        run: Where θ and policy are; the policy there is then trained anew, by the oracle's θ.
         trials: Draws and landings [m] of the rig without errors, for the oracle's θ.
     """
-    band, targets = world.band, np.array(params.trials.targets)
+    root, band, targets = run.folder, world.band, np.array(params.trials.targets)
     numbers = trial_numbers(params)
     path = root / "data/theta" / band / f"{method}.json"
     stored = Stored(band, method, root)
@@ -112,7 +113,7 @@ def split(params: Params, root: Path, world: World, trials: tuple, method: str) 
     fitted = content | {"theta": best, "confidence": None}
     predicted, aimed = launcher(policy_draws).landing_y, simulator(params, band, fitted, root=root)
     write_json(path, fitted)
-    run(root, "python", "-m", "stages.policy", band, method)
+    run("python", "-m", "stages.policy", band, method)
     draws[THETA_] = stored.draws(targets)
 
     variants = {}
@@ -149,10 +150,10 @@ def split(params: Params, root: Path, world: World, trials: tuple, method: str) 
     }
 
 
-def band_figures(params: Params, root: Path, band: str, methods, progress) -> dict:
+def band_figures(params: Params, run: ProjectCopy, band: str, progress) -> dict:
     """Floor and split of every method on one band."""
     targets = params.trials.targets
-    with World(band, root / "params.yaml") as world:
+    with World(band, run.folder / "params.yaml") as world:
         landing_map = world.landing_map(params.setup, params.floor.map_size)
         starts = [least_sensitive_draw(landing_map, target) for target in targets]
         draws = world.hits(targets, starts)
@@ -161,17 +162,14 @@ def band_figures(params: Params, root: Path, band: str, methods, progress) -> di
         landing = world.exact(tried).landing_y
         progress(f"  {band}: floor {100 * floor['mean_error_m']:.2f} cm")
         result = {"floor": floor, "methods": {}}
-        for method in methods:
-            method_figures = split(params, root, world, (tried, landing), method)
-            result["methods"][method] = method_figures
-            message = [
+        for method in METHODS:
+            result["methods"][method] = of = split(params, run, world, (tried, landing), method)
+            errors = [
                 f"{name} {100 * v['mean_error_m']:.2f} ({100 * v['without_noise_m']:.2f})"
-                for name, v in method_figures["variants"].items()
+                for name, v in of["variants"].items()
             ]
-            progress(
-                f"  {band} {method} [cm] (without noise): {', '.join(message)};"
-                f" {method_figures['limits']}"
-            )
+            message = f"{', '.join(errors)}; {of['limits']}"
+            progress(f"  {band} {method} [cm] (without noise): {message}")
     return result
 
 
@@ -182,20 +180,16 @@ def draw_figure(figures: dict, path: Path) -> None:
         size = 3.6 * len(figures), 5.6
         figure, axes = plt.subplots(2, len(figures), figsize=size, squeeze=False)
         for (band, content), (above, below) in zip(figures.items(), axes.T, strict=True):
-            for number, (method, method_figures) in enumerate(content["methods"].items()):
+            for number, (method, of) in enumerate(content["methods"].items()):
                 place = np.arange(len(kinds)) + 0.38 * (number - 0.5)
-                error = [100 * method_figures["variants"][kind]["mean_error_m"] for kind in kinds]
-                clean = [
-                    100 * method_figures["variants"][kind]["without_noise_m"] for kind in kinds
-                ]
+                error, clean = (
+                    [100 * of["variants"][kind][name] for kind in kinds]
+                    for name in ("mean_error_m", "without_noise_m")
+                )
                 above.bar(place, error, 0.36, color=COLORS[number], label=method)
                 above.plot(place, clean, "_", color=INK, ms=12)
-                targets = [
-                    float(target) for target in method_figures["variants"][AS_IT_IS]["targets"]
-                ]
-                for mark, (name, part) in zip(
-                    "os^", method_figures["bias_parts_m"].items(), strict=True
-                ):
+                targets = [float(target) for target in of["variants"][AS_IT_IS]["targets"]]
+                for mark, (name, part) in zip("os^", of["bias_parts_m"].items(), strict=True):
                     look = {"color": COLORS[number], "marker": mark, "lw": 0.8}
                     below.plot(targets, 100 * np.array(part), **look, label=f"{name}, {method}")
             floor = 100 * content["floor"]["mean_error_m"]
@@ -212,25 +206,21 @@ def draw_figure(figures: dict, path: Path) -> None:
 
 
 def test_what_the_error_of_a_landing_is_made_of(tmp_path, progress, record) -> None:
-    project = copy_of_the_project(tmp_path / "project")
-    params = load(project / "params.yaml")
-    figures = {}
+    run, figures = copy_of_the_project(tmp_path / "project"), {}
+    params = load(run.folder / "params.yaml")
     for band in params.run.rig:
         for stage in ("record", "episode", "clamps", "evidence"):
-            run(project, "python", "-m", f"stages.{stage}", band)
+            run("python", "-m", f"stages.{stage}", band)
         for method in METHODS:
             for stage in (*STEPS[params.methods[method].search], "theta", "policy"):
-                run(project, "python", "-m", f"stages.{stage}", band, method)
-        figures[band] = band_figures(params, project, band, METHODS, progress)
+                run("python", "-m", f"stages.{stage}", band, method)
+        figures[band] = band_figures(params, run, band, progress)
     draw_figure(figures, ROOT / "reports/validation/gap.png")
-    met = {
-        band: bool(
-            not content["methods"][OURS]["variants"][AS_IT_IS]["failed"]
-            and content["methods"][OURS]["variants"][AS_IT_IS]["mean_error_m"]
-            <= FACTOR * content["floor"]["mean_error_m"]
-        )
-        for band, content in figures.items()
-    }
+    met = {}
+    for band, content in figures.items():
+        ours, most = content["methods"][OURS]["variants"][AS_IT_IS], content["floor"]
+        near = ours["mean_error_m"] <= FACTOR * most["mean_error_m"]
+        met[band] = bool(near and not ours["failed"])
     record(
         "gap",
         requested="On the virtual rig, with the errors of the floor's own launches (those of the"

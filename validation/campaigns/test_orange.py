@@ -4,10 +4,7 @@ The landings enter the copy of the project after θ* is written, so no search ca
 """
 
 import json
-import os
 import shutil
-import subprocess
-import sys
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -19,7 +16,7 @@ from pipeline.base.code import ROOT
 from pipeline.params import load
 from pipeline.report.run.tables.landings import prediction_error
 from validation.campaigns.runner import OURS
-from validation.projects import copy_project, set_params
+from validation.projects import ProjectCopy, copy_project
 
 pytestmark = pytest.mark.validation
 
@@ -29,21 +26,13 @@ BAND, MASS = "orange", 0.0408  # kg, as its note says
 LIMIT = 0.05
 
 
-def copy_of_the_project(folder: Path) -> Path:
+def copy_of_the_project(folder: Path) -> ProjectCopy:
     """What Git would commit, in a repository of its own, as DVC wants it."""
     copy_project(folder)
-    subprocess.run(["git", "init", "-q"], cwd=folder, check=True)
-    return folder
-
-
-def run(folder: Path, *command: str) -> None:
-    environment = {
-        **os.environ,
-        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-        "DVC_SITE_CACHE_DIR": str(folder.parent / "site"),
-    }
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}"
+    copy = ProjectCopy(folder, PYTHONPATH=str(folder))
+    copy.limit = None
+    copy("git", "init", "-q")
+    return copy
 
 
 def launches(trials: pd.DataFrame) -> list[dict]:
@@ -63,11 +52,11 @@ def launches(trials: pd.DataFrame) -> list[dict]:
 def test_landings_are_predicted_within_the_recorded_stretch(
     tmp_path, params, progress, record
 ) -> None:
-    project, methods = copy_of_the_project(tmp_path / "project"), params.run.methods
-    table = project / "params.yaml"
-    run(project, "sling", "add-band", BAND, f"--recording={RECORDING}", f"--mass={MASS}")
+    run, methods = copy_of_the_project(tmp_path / "project"), params.run.methods
+    project, table = run.folder, run.folder / "params.yaml"
+    run("sling", "add-band", BAND, f"--recording={RECORDING}", f"--mass={MASS}")
     lists = load(table).run
-    set_params(project, {"run.own": [], "run.bands": [*lists.bands, BAND]})  # by every method
+    run.set({"run.own": [], "run.bands": [*lists.bands, BAND]})  # by every method
     # the note says where the hand was, not where it was sent
     text = table.read_text("utf-8").replace("arm_stiffness: 12000.0", "arm_stiffness: null")
     table.write_text(text, "utf-8")
@@ -75,16 +64,16 @@ def test_landings_are_predicted_within_the_recorded_stretch(
     wall = {}
     for method in methods:
         start = time.perf_counter()
-        run(project, "dvc", "repro", f"theta@{BAND}-{method}")
+        run("dvc", "repro", f"theta@{BAND}-{method}")
         wall[method] = time.perf_counter() - start
         progress(f"  θ of {method}: {wall[method]:.0f} s")
 
     shutil.copy(LANDINGS, project / "data/trials/measured" / f"{BAND}.csv")
-    run(project, "python", "-m", "stages.evidence", BAND)
+    run("python", "-m", "stages.evidence", BAND)
     figures, errors = {}, {}
     for method in methods:
         # Not through DVC: the stage would wait for a policy, which measured launches do not need.
-        run(project, "python", "-m", "stages.trials", BAND, method)
+        run("python", "-m", "stages.trials", BAND, method)
         trials = pd.read_parquet(project / "data/trials" / BAND / f"{method}.parquet")
         theta = json.loads((project / "data/theta" / BAND / f"{method}.json").read_text("utf-8"))
         errors[method] = prediction_error(trials)

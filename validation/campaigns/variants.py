@@ -21,7 +21,6 @@ LAST = "plain_bo"  # takes as long as all others
 # of the loss; late: what the paper's source has commented out.
 SETTINGS: dict[str, dict] = {
     "late": {"loss": {"late_decay": 0.5}},
-    "nominal_pads": {},
     "cma_8": {"optimizer": {"cma_population": 8}},
     "cma_32": {"optimizer": {"cma_population": 32}},
     "de_storn": {"optimizer": {"mutation": [0.7, 0.9], "recombination": 0.9}},

@@ -9,15 +9,13 @@ import numpy as np
 from pipeline.simulator import launch
 from pipeline.simulator.model import GRAVITY
 from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.records import Grip
 from validation.simulator import figures
 from validation.simulator.closed import String, cantilever, clamped_beam
 from validation.simulator.experiment import (
     TIGHT,
     band_of,
-    move,
+    held_straight,
     rest,
-    settling,
     setup_of,
     straight,
     straight_guess,
@@ -47,25 +45,12 @@ def straight_pull(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Measured and closed-form pull (N,) of a straight band whose other half is at its rest length.
 
-    The fingers hold the middle; the first half is stretched, so that the hand feels it alone.
-
     Args:
         thinner: How many times thinner the band is than its own diameter.
     """
     sling = band_of(bench)
     sling = replace(sling, radius=sling.radius / thinner)
-    half = sling.rest_length / 2
-    sling = straight(sling, (stretch + 1) * half)
-    target = (stretch * half - sling.half_width, 0.0, 0.0)
-    start = straight_guess(sling, stretch * half)
-    motion = move(
-        bench,
-        sling,
-        Parameters.of(sling.law, theta),
-        settling(Grip.HELD, target),
-        start,
-        gravity=0.0,
-    )
+    sling, motion = held_straight(bench, sling, stretch, Parameters.of(sling.law, theta))
     measured = np.where(motion.failed, np.nan, -motion.force[:, -1, 0])
     return measured, np.array([float(String.of(sling, row).force(stretch)) for row in theta])
 
@@ -76,9 +61,7 @@ def drawn_pull(bench: Bench, depth: float, theta: np.ndarray) -> tuple[np.ndarra
     half = np.hypot(depth, sling.half_width)
     stretch = 2 * half / sling.rest_length
     parameters = Parameters.of(sling.law, theta)
-    done = launch(
-        sling, setup, parameters, [-depth, 0.0], device=bench.device, workers=bench.workers
-    )
+    done = launch(sling, setup, parameters, [-depth, 0.0], **bench.on)
     strings = [String.of(sling, row) for row in theta]
     expected = [2 * float(string.force(stretch)) * depth / half for string in strings]
     return done.hold_force, np.array(expected)
@@ -100,31 +83,22 @@ def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> li
         )
         for stretch in stretches
     ]
-    checks.append(
-        Measure(
-            f"pull of the band itself at stretch {stretches[0]:g}, worst of E and ν",
-            against,
-            off(*straight_pull(bench, stretches[0], theta)),
-            "%",
-            None,
-            "of its full thickness; clamp and fingers keep their sections from thinning, which"
-            " stiffens it: no string",
-        )
-    )
+    checks.append(Measure(
+        f"pull of the band itself at stretch {stretches[0]:g}, worst of E and ν", against,
+        off(*straight_pull(bench, stretches[0], theta)), "%", None,
+        "of its full thickness; clamp and fingers keep their sections from thinning, which"
+        " stiffens it: no string",
+    ))  # fmt: skip
     width, length = band_of(bench).half_width, band_of(bench).rest_length
     for stretch in DRAWN:
         depth = np.sqrt((stretch * length / 2) ** 2 - width**2)
-        checks.append(
-            Measure(
-                f"hold force of a draw of {depth:.2f} m (stretch {stretch:g}), worst of E and ν",
-                f"two straight strings, {against}",
-                off(*drawn_pull(bench, depth, theta)),
-                "%",
-                PULL_LIMIT if stretch > SOFT else None,
-                "as `launch` gives it, single precision; bending at tips and pouch"
-                + (" hardly counts" if stretch > SOFT else " counts, and is no string's"),
-            )
-        )
+        checks.append(Measure(
+            f"hold force of a draw of {depth:.2f} m (stretch {stretch:g}), worst of E and ν",
+            f"two straight strings, {against}",
+            off(*drawn_pull(bench, depth, theta)), "%", PULL_LIMIT if stretch > SOFT else None,
+            "as `launch` gives it, single precision; bending at tips and pouch"
+            + (" hardly counts" if stretch > SOFT else " counts, and is no string's"),
+        ))  # fmt: skip
     return checks
 
 
@@ -206,27 +180,15 @@ def torsion(bench: Bench, poissons=BEAM_POISSON) -> list[Measure]:
     for poisson in poissons:
         ratio = torque_ratio(bench, 0.1, poisson)
         note = f"{ratio:.4f} of it"
-        checks.append(
-            Measure(
-                f"torque at a twist of 0.1 rad, ν {poisson:.2f}",
-                against,
-                off(ratio, 1.0),
-                "%",
-                TORSION_LIMIT,
-                note,
-            )
-        )
+        checks.append(Measure(
+            f"torque at a twist of 0.1 rad, ν {poisson:.2f}", against,
+            off(ratio, 1.0), "%", TORSION_LIMIT, note,
+        ))  # fmt: skip
     ratio = torque_ratio(bench, np.pi, 0.45)
-    checks.append(
-        Measure(
-            "torque at half a turn, ν 0.45",
-            against,
-            off(ratio, 1.0),
-            "%",
-            None,
-            f"{ratio:.4f} of it; the small-twist form need not hold there",
-        )
-    )
+    checks.append(Measure(
+        "torque at half a turn, ν 0.45", against, off(ratio, 1.0), "%", None,
+        f"{ratio:.4f} of it; the small-twist form need not hold there",
+    ))  # fmt: skip
     return checks
 
 

@@ -77,16 +77,12 @@ def dissipation(bench: Bench, count: int = 10) -> list[Measure]:
             power_gain(ReferenceRod(sling, Parameters.of(sling.law, theta)), x)
             for theta, x in zip(thetas, states, strict=True)
         ]
-        checks.append(
-            Measure(
-                f"power gained in states {kind}",
-                "no rates gain energy: lowest eigenvalue of the dissipation ≥ 0",
-                float(max(gains)),
-                "of what is lost",
-                ROUNDING,
-                f"{sum(gain > ROUNDING for gain in gains)} of {count} states and θ gain",
-            )
-        )
+        checks.append(Measure(
+            f"power gained in states {kind}",
+            "no rates gain energy: lowest eigenvalue of the dissipation ≥ 0",
+            float(max(gains)), "of what is lost", ROUNDING,
+            f"{sum(gain > ROUNDING for gain in gains)} of {count} states and θ gain",
+        ))  # fmt: skip
     return checks
 
 
@@ -130,26 +126,16 @@ def growth(bench: Bench, count: int = 48) -> list[Measure]:
         every = np.concatenate(list(energies.values()))
         retained = ", ".join(f"{len(energy)} {kind}" for kind, energy in energies.items())
         note = f"kept of {2 * count} random states and θ each: {retained}; others are marked failed"
-        checks.append(
-            Measure(
-                f"rise above the start, {label}, {1e3 * h:g} ms",
-                "energy never grows without work",
-                float(np.max(every - 1, initial=0.0)),
-                "of the start",
-                ROUNDING,
-                note,
-            )
-        )
-        checks.append(
-            Measure(
-                f"rise in any one step, {label}, {1e3 * h:g} ms",
-                "energy never grows without work",
-                float(np.max(np.diff(every, axis=1), initial=0.0)),
-                "of the start",
-                ROUNDING if order == 1 else None,
-                note if order == 1 else "two-step method: its energy may sway from step to step",
-            )
-        )
+        checks.append(Measure(
+            f"rise above the start, {label}, {1e3 * h:g} ms", "energy never grows without work",
+            float(np.max(every - 1, initial=0.0)), "of the start", ROUNDING, note,
+        ))  # fmt: skip
+        checks.append(Measure(
+            f"rise in any one step, {label}, {1e3 * h:g} ms", "energy never grows without work",
+            float(np.max(np.diff(every, axis=1), initial=0.0)), "of the start",
+            ROUNDING if order == 1 else None,
+            note if order == 1 else "two-step method: its energy may sway from step to step",
+        ))  # fmt: skip
     return checks
 
 
@@ -235,16 +221,11 @@ def oscillator(bench: Bench, cases=None, per_period: int = 800) -> list[Measure]
         oscillate(bench, theta, axis=1, per_period=per_period, turn_damping=share)[index][1]
         for share, index in ((0.0, 2), (1.0, 3))
     )
-    checks.append(
-        Measure(
-            "decay across the band, turns not braked",
-            "0: what only turns loses nothing",
-            100 * slow / fast,
-            "% of what it is where they are",
-            DECAY_LIMIT,
-            f"{slow:.4g} /s, where turns are braked {fast:.4g} /s in closed form",
-        )
-    )
+    checks.append(Measure(
+        "decay across the band, turns not braked", "0: what only turns loses nothing",
+        100 * slow / fast, "% of what it is where they are", DECAY_LIMIT,
+        f"{slow:.4g} /s, where turns are braked {fast:.4g} /s in closed form",
+    ))  # fmt: skip
     return checks
 
 

@@ -113,6 +113,20 @@ def move(
     )
 
 
+def held_straight(
+    bench: Bench, sling: ClampedBand, stretch: float, parameters: Parameters, **options
+) -> tuple[ClampedBand, Trajectories]:
+    """A straight band that comes to rest with its first half stretched, the other at its length.
+
+    The fingers hold the middle, so that the hand feels the first half alone.
+    """
+    half = sling.rest_length / 2
+    sling = straight(sling, (stretch + 1) * half)
+    table = settling(Grip.HELD, (stretch * half - sling.half_width, 0.0, 0.0))
+    start = straight_guess(sling, stretch * half)
+    return sling, move(bench, sling, parameters, table, start, gravity=0.0, **options)
+
+
 def rates(
     middle: int, table: np.ndarray, start: np.ndarray, x: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:

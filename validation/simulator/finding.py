@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +35,10 @@ class Measure:
         if self.limit is None:
             return None
         return bool(math.isfinite(self.value) and self.value <= self.limit)
+
+    @property
+    def entry(self) -> dict:
+        return asdict(self) | {"met": self.met}
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,11 @@ class Bench:
     device: str = "cpu"
     workers: int = 1
     figures: Path | None = None
+
+    @property
+    def on(self) -> dict:
+        """Where simulations run, as options of theirs."""
+        return {"device": self.device, "workers": self.workers}
 
 
 def off(value, expected) -> float:

@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.simulator import ClampedBand, Parameters, interact
-from pipeline.simulator.records import Grip
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.simulator.at_rest import STRING
 from validation.simulator.closed import String
 from validation.simulator.damping import oscillate
-from validation.simulator.experiment import band_of, move, settling, straight, straight_guess
+from validation.simulator.experiment import band_of, held_straight
 from validation.simulator.finding import Bench, Measure, Theme, off
 from validation.synthetic import pull_and_release
 
@@ -30,7 +29,7 @@ def held_force(
 ) -> np.ndarray:
     """Force (N,) on the hand in the yardstick's pause before the release."""
     episode = pull_and_release("band", bench.params.episode, sling)
-    done = interact(sling, episode, parameters, device=bench.device, workers=bench.workers)
+    done = interact(sling, episode, parameters, **bench.on)
     force = np.linalg.norm(done.force[:, np.argmin(np.abs(done.times - when))], axis=1)
     return np.where([reason is None for reason in done.failure], force, np.nan)
 
@@ -54,14 +53,8 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Measure]:
     """Volume of a straight, held string, and its pull at given E, from nu 0.30 to 0.49."""
     sling = band_of(bench)
     sling = replace(sling, radius=sling.radius / STRING)
-    half = sling.rest_length / 2
-    sling = straight(sling, (stretch + 1) * half)
-    target = (stretch * half - sling.half_width, 0.0, 0.0)
     thetas = _with(poissons_ratio=np.array([0.30, 0.49]))
-    motion = move(
-        bench, sling, thetas, settling(Grip.HELD, target), straight_guess(sling, stretch * half),
-        gravity=0.0, double=True,
-    )  # fmt: skip
+    sling, motion = held_straight(bench, sling, stretch, thetas, double=True)
     strings = [String.of(sling, theta) for theta in thetas.theta]
     edge = sling.middle // 2  # away from the ends
     sections = motion.x[:, -1]
@@ -141,14 +134,7 @@ def friction(bench: Bench, count: int = 33) -> list[Measure]:
     peak = force[held].max()
     least = peak / (2 * sling.grip_force)
     tries = least * np.linspace(0.98, 1.02, count)
-    done = interact(
-        sling,
-        episode,
-        _with(dynamic_friction=tries),
-        device=bench.device,
-        workers=bench.workers,
-    )
-    reasons = done.failure
+    reasons = interact(sling, episode, _with(dynamic_friction=tries), **bench.on).failure
     holds = np.array([reason is None for reason in reasons])
     named = all(reason in (None, SLIP) for reason in reasons)
     threshold = tries[holds].min() if holds.any() and named else np.nan

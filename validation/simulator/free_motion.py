@@ -61,16 +61,11 @@ def free_fall(bench: Bench, count: int = 60) -> list[Measure]:
         motion = move(bench, sling, theta, table, straight_guess(sling), **TIGHT)
         miss = np.abs(motion.x[0, :, :, 2] - fall_of_a_point(times, order)[1:, None]).max()
         fallen = -motion.x[0, -1, 0, 2]
-        checks.append(
-            Measure(
-                f"height in free fall, {name}",
-                "the steps' own solution for a point mass",
-                float(miss / fallen),
-                "of the fall",
-                ROUNDING,
-                f"{count} steps, {100 * fallen:.2g} cm, both ends free, double precision",
-            )
-        )
+        checks.append(Measure(
+            f"height in free fall, {name}", "the steps' own solution for a point mass",
+            float(miss / fallen), "of the fall", ROUNDING,
+            f"{count} steps, {100 * fallen:.2g} cm, both ends free, double precision",
+        ))  # fmt: skip
     return checks
 
 
@@ -131,27 +126,17 @@ def momentum(bench: Bench) -> list[Measure]:
     for order, name in ((1, "backward Euler"), (2, "second order")):
         linear, coarse = recoil(bench, step, order, 0.0)
         _, fine = recoil(bench, step / 2, order, 0.0)
-        checks.append(
-            Measure(
-                f"linear momentum out of nothing, {name}",
-                "conservation",
-                linear,
-                "of the parts'",
-                ROUNDING,
-                "recoil of a bent, stretched band with free ends, double precision",
-            )
-        )
-        checks.append(
-            Measure(
-                f"angular momentum out of nothing, {name}, no damping",
-                "conservation",
-                coarse,
-                "of the parts'",
-                ANGULAR_LIMIT,
-                f"steps of {1e3 * step:g} ms; half of them leave {fine:.2g}: order"
-                f" {np.log2(coarse / fine):.2f}",
-            )
-        )
+        checks.append(Measure(
+            f"linear momentum out of nothing, {name}", "conservation",
+            linear, "of the parts'", ROUNDING,
+            "recoil of a bent, stretched band with free ends, double precision",
+        ))  # fmt: skip
+        checks.append(Measure(
+            f"angular momentum out of nothing, {name}, no damping", "conservation",
+            coarse, "of the parts'", ANGULAR_LIMIT,
+            f"steps of {1e3 * step:g} ms; half of them leave {fine:.2g}: order"
+            f" {np.log2(coarse / fine):.2f}",
+        ))  # fmt: skip
     checks.append(  # of the second order, the last of both
         Measure(
             "order of angular momentum in time, second order, what it is short of 2",
@@ -163,18 +148,13 @@ def momentum(bench: Bench) -> list[Measure]:
         )
     )
     damped, finer = (recoil(bench, h, 2, THETA[2])[1] for h in (step, step / 2))
-    checks.append(
-        Measure(
-            f"angular momentum out of nothing, second order, d {1e3 * THETA[2]:g} ms",
-            "conservation",
-            damped,
-            "of the parts'",
-            ANGULAR_LIMIT,
-            f"shorter steps leave as much ({finer:.2g} at half of them): the rate of"
-            " the nominal stress is not that of a rigidly turning observer: damping as it is"
-            " defined brakes the turning of a stretched band too",
-        )
-    )
+    checks.append(Measure(
+        f"angular momentum out of nothing, second order, d {1e3 * THETA[2]:g} ms",
+        "conservation", damped, "of the parts'", ANGULAR_LIMIT,
+        f"shorter steps leave as much ({finer:.2g} at half of them): the rate of"
+        " the nominal stress is not that of a rigidly turning observer: damping as it is"
+        " defined brakes the turning of a stretched band too",
+    ))  # fmt: skip
     return checks
 
 

@@ -78,7 +78,7 @@ def convergence(
     sling, (thetas, draws) = sling or band_of(bench), random_launches(count)
     setup = setup_of(bench, history=history)
     thetas = Parameters.of(sling.law, thetas, **others)
-    default = launch(sling, setup, thetas, draws, device=bench.device, workers=bench.workers)
+    default = launch(sling, setup, thetas, draws, **bench.on)
     finer = {f"{REFINE} times finer steps": (sling, {"refine": REFINE})}
     finer |= {f"a mesh {n} times finer": (with_edges(sling, n), {}) for n in meshes}
     finer |= {
@@ -99,11 +99,9 @@ def convergence(
         if name in stated:
             note += f"; stated: past the {meshes[0]} times finer mesh that the limit is for"
         limit = None if name in stated else LIMIT
-        checks.append(
-            Measure(
-                f"launch speed, worst of {count} random θ", name, far["speed"], "%", limit, note
-            )
-        )
+        checks.append(Measure(
+            f"launch speed, worst of {count} random θ", name, far["speed"], "%", limit, note
+        ))  # fmt: skip
     return checks
 
 
@@ -113,8 +111,7 @@ def order_in_time(bench: Bench, count: int = COUNT) -> list[Measure]:
     parameters = Parameters.of(sling.law, thetas)
 
     def speed(refine: int) -> np.ndarray:
-        common = {"device": bench.device, "workers": bench.workers}
-        return launch(sling, setup, parameters, draws, double=True, refine=refine, **common).speed
+        return launch(sling, setup, parameters, draws, double=True, refine=refine, **bench.on).speed
 
     finest = speed(REFERENCE)
     errors = np.array([np.abs(speed(refine) / finest - 1) for refine in REFINED])
@@ -154,7 +151,7 @@ def physics(bench: Bench, count: int = COUNT) -> list[Measure]:
     """Ballistic flight, and the energy that the drawn band holds."""
     sling, setup, (thetas, draws) = band_of(bench), setup_of(bench), random_launches(count)
     parameters = Parameters.of(sling.law, thetas)
-    done = launch(sling, setup, parameters, draws, device=bench.device, workers=bench.workers)
+    done = launch(sling, setup, parameters, draws, **bench.on)
     state = zip(done.separation_y, done.separation_z, done.speed, done.angle, strict=True)
     flights = [_flight(*row, -setup.fork_height) for row in state]
     shares = []

@@ -56,7 +56,7 @@ def survey(
     reasons, bad, farthest, failed = Counter(), 0, 0.0, []
     for first in range(0, len(parameters), batch):
         part = parameters[first : first + batch]
-        done = interact(sling, episode, part, device=bench.device, workers=bench.workers)
+        done = interact(sling, episode, part, **bench.on)
         good = np.array([reason is None for reason in done.failure])
         reasons.update(reason for reason in done.failure if reason is not None)
         lines, force = done.center_line[good], done.force[good]
@@ -84,8 +84,7 @@ def survey_launches(bench: Bench, sling: ClampedBand, parameters: Parameters) ->
     draws = np.column_stack(
         [rng.uniform(*ends, len(parameters)) for ends in (box.draw_y, box.draw_z)]
     )
-    options = {"device": bench.device, "workers": bench.workers}
-    done = launch(sling, setup_of(bench), parameters, draws, **options)
+    done = launch(sling, setup_of(bench), parameters, draws, **bench.on)
     good = np.array([reason is None for reason in done.failure])
     outcome = np.column_stack([done.landing_y, done.speed, done.angle, done.hold_force])
     return {
@@ -96,11 +95,7 @@ def survey_launches(bench: Bench, sling: ClampedBand, parameters: Parameters) ->
 
 
 def section(
-    bench: Bench,
-    count: int = COUNT,
-    launches: int = LAUNCHES,
-    faces: int = FACES,
-    progress=print,
+    bench: Bench, count: int = COUNT, launches: int = LAUNCHES, faces: int = FACES, progress=print
 ) -> Theme:
     sling = band_of(bench)
     thetas = Parameters.of(sling.law, random_thetas(bench, count, SEED))

@@ -18,7 +18,14 @@ from pipeline.simulator.rubber import RUBBER, TIMES
 from pipeline.simulator.schedule import steps
 from validation.simulator import agreement, energy, launching, robustness
 from validation.simulator.at_rest import STRING
-from validation.simulator.closed import oscillation
+from validation.simulator.closed import (
+    integral,
+    left_of,
+    oscillation,
+    relaxed_share,
+    slope,
+    stress,
+)
 from validation.simulator.damping import STATES, oscillate, random_states
 from validation.simulator.experiment import (
     band_of,
@@ -31,7 +38,6 @@ from validation.simulator.experiment import (
 )
 from validation.simulator.finding import Bench, Measure, Theme, off
 from validation.simulator.reference import ReferenceRod
-from validation.simulator.rubber_string import integral, left_of, relaxed_share, slope, stress
 
 SHAPES = (-0.3, 0.2), (0.3, 0.0), (0.9, 0.05)  # Mooney's share and the upturn
 BOX = {
@@ -55,9 +61,7 @@ def rubber_of(bench: Bench) -> ClampedBand:
 
 
 def law_parameters(
-    shape: tuple[float, float] = SHAPE,
-    relaxation: float = RELAXATION,
-    softening: float = SOFTENING,
+    shape: tuple[float, float] = SHAPE, relaxation: float = RELAXATION, softening: float = SOFTENING
 ) -> dict[str, float]:
     """Parameters that the law has of its own."""
     names = "mooney_share", "upturn", "softening", "relaxation"
@@ -148,16 +152,12 @@ def relaxation(bench: Bench, shape=SHAPE, most: float = 1.6) -> list[Measure]:
         chosen = np.flatnonzero((at > first) & (stretch[1:] > 1.05))[::40]
         summary = np.array([integral(history, at[k], shape, RELAXATION) for k in chosen])
         worst = 100 * np.abs(got[chosen] - summary).max() / summary.max()
-        checks.append(
-            Measure(
-                f"stress {name}, to {100 * (most - 1):.0f} % strain, worst moment",
-                "hereditary integral of the nominal stress",
-                float(worst),
-                "% of its peak",
-                INTEGRAL_LIMIT,
-                f"share and upturn {shape}, {100 * RELAXATION:g} % a decade",
-            )
-        )
+        checks.append(Measure(
+            f"stress {name}, to {100 * (most - 1):.0f} % strain, worst moment",
+            "hereditary integral of the nominal stress",
+            float(worst), "% of its peak", INTEGRAL_LIMIT,
+            f"share and upturn {shape}, {100 * RELAXATION:g} % a decade",
+        ))  # fmt: skip
     return checks
 
 

@@ -18,6 +18,7 @@ from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_json, write_text
 from validation.benchmarks.timing import available
+from validation.reports import plain
 from validation.simulator import (
     agreement,
     at_rest,
@@ -183,18 +184,7 @@ def _short(value: float) -> str:
 def _entry(section: Theme) -> dict:
     return {
         "title": section.title,
-        "checks": [
-            {
-                "name": check.name,
-                "against": check.against,
-                "value": float(f"{check.value:.5g}") if math.isfinite(check.value) else None,
-                "unit": check.unit,
-                "limit": check.limit,
-                "met": check.met,
-                "note": check.note,
-            }
-            for check in section.checks
-        ],
+        "checks": plain([check.entry for check in section.checks], 5),
         "details": section.details,
         "not_run": section.not_run or None,
     }

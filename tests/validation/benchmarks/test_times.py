@@ -11,8 +11,9 @@ from app.cli import parser
 from pipeline.base.errors import UserError
 from tests.project import ROOT
 from validation.benchmarks import times as bench
-from validation.benchmarks.command import disk, measured
 from validation.benchmarks.times import BEGIN, END, MeasuredStep
+from validation.benchmarks.timing import disk, measured
+from validation.marked import with_block
 
 HUNDRED_MB = "import time; held = b'1' * 100_000_000; time.sleep({seconds})"
 AMONG_CHILDREN = f"""
@@ -141,12 +142,12 @@ def test_steps_are_measured_once_and_failures_again(project: Path, tmp_path: Pat
 
 def test_a_page_without_marks_is_refused() -> None:
     with pytest.raises(UserError, match="has not one <!-- times: begin -->"):
-        bench.with_block("# Times\n", f"{BEGIN}{END}")
+        with_block("# Times\n", f"{BEGIN}{END}")
 
 
 def test_the_table_of_the_docs_is_that_of_the_measurement() -> None:
     page = (ROOT / bench.PAGE).read_text(encoding="utf-8")
-    assert bench.with_block(page, f"{BEGIN}{END}")  # it has the marks
+    assert with_block(page, f"{BEGIN}{END}")  # it has the marks
     if not (ROOT / bench.REPORT).is_file():
         pytest.skip("not measured")
     report = json.loads((ROOT / bench.REPORT).read_text(encoding="utf-8"))

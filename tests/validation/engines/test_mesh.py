@@ -1,26 +1,17 @@
 """The band as other engines take it, and the comparison where there is nothing to compare with."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.export.mesh import CLAMPED, Tube
-from pipeline.params import load
-from pipeline.simulator.model import ClampedBand
-from tests.project import DEFAULTS
 from validation.engines import checks
 from validation.simulator.closed import String
-from validation.simulator.finding import Bench
 
 THETA = np.array([2.2e5, 0.45, 3e-3, 1.0, 1.0])
-
-
-@pytest.fixture(scope="module")
-def sling():
-    params = load(DEFAULTS)
-    return ClampedBand.of(params.bands["band1"], params.setup, params.sling)
 
 
 def test_it_weighs_as_much_as_the_band_and_what_is_in_the_clamps(sling):
@@ -51,12 +42,12 @@ def test_its_force_is_the_closed_form_of_a_straight_string(sling, rings):
     assert force[1:-1] == pytest.approx(np.zeros(force[1:-1].shape), abs=1e-9)
 
 
-def test_without_mujoco_the_section_says_how_to_get_it(monkeypatch):
+def test_without_mujoco_the_section_says_how_to_get_it(bench, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(UserError, match="make setup"):
-        checks.section(Bench(load(DEFAULTS)))
+        checks.section(bench)
 
 
-def test_our_tetrahedra_are_compared_on_the_cpu_whatever_the_device():
-    same = checks.solid(Bench(load(DEFAULTS), device="cuda:0"))
+def test_our_tetrahedra_are_compared_on_the_cpu_whatever_the_device(bench):
+    same = checks.solid(replace(bench, device="cuda:0"))
     assert same.device == "cpu" and same.params.sling.mesh == "tetrahedra"

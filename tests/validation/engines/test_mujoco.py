@@ -6,18 +6,11 @@ import numpy as np
 import pytest
 
 from pipeline.export.mesh import Tube
-from pipeline.params import load
-from tests.project import DEFAULTS
 from validation.engines import checks
 from validation.engines.mujoco_flex import FlexBand
-from validation.simulator.finding import Bench, unmet
+from validation.simulator.finding import unmet
 
 mujoco = pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[validation]'")
-
-
-@pytest.fixture(scope="module")
-def bench():
-    return Bench(load(DEFAULTS))
 
 
 @pytest.fixture(scope="module")

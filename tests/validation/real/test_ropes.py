@@ -14,16 +14,7 @@ from pipeline.simulator.records import Grip
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from pipeline.simulator.schedule import steps
 from validation.real import data
-from validation.real.ropes import (
-    POISSON,
-    YOUNG,
-    begun,
-    chords_of,
-    fitted,
-    inner,
-    rope_of,
-    swing,
-)
+from validation.real.ropes import POISSON, YOUNG, begun, chords_of, fitted, inner, rope_of, swing
 from validation.simulator.march import Driven, march
 from validation.simulator.reference import ReferenceRod
 

@@ -1,5 +1,7 @@
 """The checks of `sling verify` keep their limits, at smaller sizes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -90,6 +92,24 @@ def test_random_thetas_are_finite_or_fail_by_name(bench):
     assert_kept(section.checks)
 
 
+def test_launches_of_random_rubber_are_finite_or_fail_by_name(bench):
+    points = rubber.random_points(bench, 64)
+    counts = robustness.survey_launches(bench, rubber.rubber_of(bench), points)
+    assert counts["launches"] == 64 and counts["not_finite"] == 0
+
+
+def test_what_is_not_finite_and_not_marked_is_counted(bench, monkeypatch):
+    true = robustness.interact
+
+    def broken(*args, **options):
+        done = true(*args, **options)
+        return replace(done, force=np.nan * done.force, failure=[None] * len(done.failure))
+
+    monkeypatch.setattr(robustness, "interact", broken)
+    points = rubber.random_points(bench, 4)
+    assert robustness.survey(bench, rubber.rubber_of(bench), points)["not_finite"] == 4
+
+
 def test_samples_are_as_many_as_asked_for_and_lie_where_they_should(bench):
     for count in (3, launching.COUNT + 5):
         theta, draws = launching.random_launches(count)
@@ -99,8 +119,3 @@ def test_samples_are_as_many_as_asked_for_and_lie_where_they_should(bench):
         bounds = getattr(bench.params.parameters, name)
         at = np.isclose(thetas.column(name)[:, None], [bounds.low, bounds.high])
         assert at.sum(0).tolist() == [2, 2]
-
-
-def test_angular_momentum_is_kept_the_better_the_finer_the_steps(bench):
-    coarse, fine = (free_motion.recoil(bench, h, 2, 0.0)[1] for h in (5e-4, 1.25e-4))
-    assert fine < coarse / 12 and fine < 1e-4

@@ -11,7 +11,6 @@ where it was stopped.
 
 from __future__ import annotations
 
-import json
 import shutil
 import time
 from collections import Counter
@@ -22,9 +21,7 @@ from pathlib import Path
 
 from pipeline.base import errors
 from pipeline.base.code import ROOT, digests
-from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
 from validation.campaigns.kills import compare, full_disk, strike
 from validation.campaigns.kills.commands import (
@@ -37,8 +34,9 @@ from validation.campaigns.kills.commands import (
     orphans,
     source,
 )
-from validation.campaigns.runner import ResultLines, made_once, parser
+from validation.campaigns.runner import ResultLines, made_once, parser, read
 from validation.projects import PROMPT, send
+from validation.reports import write_report
 
 WORK = Path("data/kills")
 REPORT = ROOT / "reports/validation/kills.json"
@@ -239,12 +237,11 @@ def report(lines: ResultLines, kills: int, disks: int, expected: dict, names: li
 
 
 def main() -> int:
-    options = parser(__doc__, REPORT)
+    options = parser(__doc__, REPORT, WORK, many=False)
     options.add_argument("--kills", type=int, default=100)
     options.add_argument("--full-disks", type=int, default=20)
     options.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
     options.add_argument("--at-once", type=int, default=2, help="commands at a time (default: 2)")
-    options.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
     arguments = options.parse_args()
     work, names = arguments.work.resolve(), arguments.commands
     work.mkdir(parents=True, exist_ok=True)
@@ -268,15 +265,14 @@ def main() -> int:
     content = report(lines, arguments.kills, arguments.full_disks, expected, names)
     for fault in content["figures"]["faults"]:  # wherever it ran
         fault["fault"] = fault["fault"].replace(str(work), "WORK")
-    command = f"python -m validation.campaigns.kills --kills {arguments.kills}"
-    command += f" --full-disks {arguments.full_disks}"
     ran = [project / "app/cli.py", *sorted((project / "stages").glob("[a-z]*.py"))]
-    provenance = environment("cpu", command) | {
-        "commit": json.loads((work / "source.json").read_text())["commit"],
+    content |= {
+        "commit": read(work / "source.json")["commit"],
         "simulator": fingerprint(project / "pipeline/simulator")[:12],
         "code": digests(project / Path(__file__).relative_to(ROOT), *ran, root=project),
     }
-    write_json(arguments.report, content | provenance)
+    command = f"--kills {arguments.kills} --full-disks {arguments.full_disks}"
+    write_report(arguments.report, content, command)
     say(f"{'met' if content['met'] else 'NOT met'}: {arguments.report}")
     return 0 if content["met"] else 1
 

@@ -26,7 +26,6 @@ from validation.projects import (
     copy_project,
     marked,
     run_of,
-    send,
     set_params,
     wait,
 )
@@ -71,10 +70,7 @@ class StruckCopy(ProjectCopy):
     def __init__(self, place: Path, work: Path) -> None:
         self.place, self.disk, temporary = place, place / "disk", place / "tmp"
         super().__init__(
-            self.disk / "copy",
-            SLING_WORKERS="1",
-            TMPDIR=str(temporary),
-            **{OF_CAMPAIGN: str(work)},
+            self.disk / "copy", SLING_WORKERS="1", TMPDIR=str(temporary), **{OF_CAMPAIGN: str(work)}
         )
         self.environment["DVC_SITE_CACHE_DIR"] = str(place / "site")
         temporary.mkdir(parents=True, exist_ok=True)
@@ -108,14 +104,7 @@ class StruckCopy(ProjectCopy):
 
     def left(self, seconds: float) -> list[str]:
         """Commands of what lives still after so long, services apart; it is ended then."""
-        apart = {service.pid for service in self.services}
-        alive = lambda: [process for process in self.run.alive() if process.pid not in apart]  # noqa: E731
-        wait(lambda: not alive(), seconds)
-        survivors = alive()
-        message = [" ".join(process.cmdline()) for process in survivors if process.is_running()]
-        for process in survivors:
-            send(process)
-        return message
+        return self.run.left(seconds, [service.pid for service in self.services])
 
     def mend(self) -> bool:
         """What docs/flow.md advises before this command is begun again; whether it was needed."""

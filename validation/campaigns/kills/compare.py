@@ -11,14 +11,7 @@ from pathlib import Path
 import psutil
 from ruamel.yaml import YAML
 
-PASSING = {
-    ".git",
-    ".dvc",
-    "__pycache__",
-    ".prefect",
-    "logs",
-    ".checkpoints",
-}  # folders no result is in
+PASSING = {".git", ".dvc", "__pycache__", ".prefect", "logs", ".checkpoints"}  # without results
 ELSEWHERE = {"run.js", "dvc.lock"}  # when and where it ran; the order of its entries is chance
 MADE = ("data", "reports", "params.yaml")
 LOCKS = (".dvc/tmp/lock", ".dvc/tmp/rwlock.lock", ".dvc/tmp/flow.lock")
@@ -32,9 +25,7 @@ def contents(folder: Path) -> dict[str, str]:
     digests = {}
     for at, folders, names in os.walk(folder):
         folders[:] = [
-            subfolder
-            for subfolder in folders
-            if not (subfolder in PASSING or subfolder.endswith(".tmp"))
+            inner for inner in folders if inner not in PASSING and not inner.endswith(".tmp")
         ]
         for name in names:
             if name not in ELSEWHERE and not name.endswith(".tmp"):

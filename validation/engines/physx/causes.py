@@ -22,14 +22,13 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
 from pipeline.export.usd import UsdBand
 from pipeline.params import load
 from validation.engines.physx.bands import Engine, release
 from validation.engines.physx.exported import Steps, held, read, yielded
 from validation.engines.physx.scene import tuples
+from validation.reports import write_report
 
 REPORT = Path("reports/validation/export-usd-causes.json")
 ITERATIONS = "physxDeformableBody:solverPositionIterationCount"
@@ -155,9 +154,12 @@ def main() -> None:
         raise UserError(f"{numbers}: has no launches; `sling export --to yaml` writes them")
     launches.sort(key=lambda launch: np.hypot(*launch["draw_m"]))
     stiffness, rows = load().setup.arm_stiffness, {}
-    content = {"asked": "One change at a time; what it holds beside the calibrated simulation."}
-    described = environment("cuda:0", "python -m validation.engines.physx.causes USD YAML")
-    described["versions"] |= {"ovphysx": version}
+    content = {
+        "asked": "One change at a time; what it holds beside the calibrated simulation.",
+        "band": name,
+        "variants": rows,
+    }
+    options = {"device": "cuda:0", "versions": {"ovphysx": version}}
     with Engine() as engine:
         for variant, change in VARIANTS.items():
             stage = change(Variant(text, band))
@@ -169,7 +171,7 @@ def main() -> None:
                 f" {volume:.0f} % of the volume",
                 flush=True,
             )
-            write_json(REPORT, content | {"band": name, "variants": rows} | described)
+            write_report(REPORT, content, "USD YAML", **options)
 
 
 if __name__ == "__main__":

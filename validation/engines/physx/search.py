@@ -20,9 +20,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.base import errors
-from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
 from pipeline.base.machine import devices
 from pipeline.identify.identify import evaluations_of
 from pipeline.identify.objective.box import SearchBox
@@ -39,6 +37,7 @@ from pipeline.simulator.parameters import Parameters
 from validation.engines.physx.bands import Engine, release
 from validation.engines.physx.launches import FINE, alike, draws_of, launch_in_physx
 from validation.engines.physx.rollouts import ITERATIONS, RATE
+from validation.reports import plain, write_report
 
 METHOD = "sling2sim2real"
 OURS, PHYSX = "ours", "physx"
@@ -76,8 +75,8 @@ class Comparison:
         for engine in (OURS, PHYSX):
             done = service("losses", self.band, engine, self.params, len(unit))(unit)
             rows[engine] = [
-                {"total": _plain(done.total[i]), "failure": done.failure[i]}
-                | {name: _plain(done.terms[name][i]) for name in TERMS}
+                {"total": done.total[i], "failure": done.failure[i]}
+                | {name: done.terms[name][i] for name in TERMS}
                 for i in range(len(thetas))
             ]
         return rows
@@ -92,7 +91,7 @@ class Comparison:
         )
         rows = []
         for i, draw in enumerate(draws):
-            by = dict(zip((OURS, PHYSX), map(_plain, landings[:, i]), strict=True))
+            by = dict(zip((OURS, PHYSX), landings[:, i], strict=True))
             rows.append({"draw_m": draw.tolist(), "landing_by_theta_of_m": by})
             if measured is not None:
                 rows[-1]["measured_m"] = float(measured[i])
@@ -111,14 +110,16 @@ class Comparison:
         else:
             with Engine() as engine:
                 pushed = launch_in_physx(engine, *both, each, every, rate=rate)
-            done, gained = pushed.launches, [_plain(value) for value in pushed.gained]
-        columns = {
-            "landing_m": [_plain(value) for value in done.landing_y],
-            "speed_m_per_s": [_plain(value) for value in done.speed],
-            "hold_force_n": [_plain(value) for value in done.hold_force],
-            "energy_gained": gained,
-            "failure": done.failure,
-        }
+            done, gained = pushed.launches, pushed.gained
+        columns = plain(
+            {
+                "landing_m": done.landing_y,
+                "speed_m_per_s": done.speed,
+                "hold_force_n": done.hold_force,
+                "energy_gained": gained,
+                "failure": done.failure,
+            }
+        )
         count = len(draws)
         return {
             name: {key: column[i * count : (i + 1) * count] for key, column in columns.items()}
@@ -148,9 +149,8 @@ def main() -> None:
     parser.add_argument("--landings", help="CSV of measured launches of this band")
     requested = parser.parse_args()
     params, version = load(requested.params), release()
-    command = f"python -m validation.engines.physx.search {requested.band}"
-    command += " --landings CSV" if requested.landings else ""
-    provenance = environment(devices()[0], command)
+    arguments = requested.band + (" --landings CSV" if requested.landings else "")
+    options = {"device": devices()[0], "versions": {"ovphysx": version}}
     if requested.landings:
         table = pd.read_csv(requested.landings)
         draws, measured = table[["draw_y_m", "draw_z_m"]].to_numpy(), table.landing_y_m
@@ -177,9 +177,8 @@ def main() -> None:
         "settings": {"steps_per_s": RATE, "iterations": ITERATIONS, "tetrahedra": 936},
         "launches_in_our_simulator": comparison.launches(np.array(thetas), draws, measured),
     }
-    provenance["versions"] |= {"ovphysx": version}
     path = Path("reports/validation") / f"physx-{requested.band}.json"
-    write_json(path, content | provenance)
+    write_report(path, content, arguments, **options)
     done, failures = {}, {}
     for where, rate in ((OURS, RATE), (PHYSX, RATE), (f"{PHYSX}_{FINE}_hz", FINE)):
         try:
@@ -191,11 +190,7 @@ def main() -> None:
             "failed_engines": failures,
             "draws": side_by_side(done, draws, measured),
         }
-        write_json(path, content | provenance)
-
-
-def _plain(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+        write_report(path, content, arguments, **options)
 
 
 if __name__ == "__main__":

@@ -11,19 +11,16 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.base.machine import gpus
 from pipeline.export.mesh import Tube
-from pipeline.params import load
 from pipeline.simulator.cylinder import volumes
-from tests.project import DEFAULTS
 from validation.engines import checks
 from validation.engines.physx import bands, scene, study
-from validation.simulator.finding import Bench
 
 THETA = np.array([2.2e5, 0.45, 3e-3, 1.0, 1.0])
 
 
 @pytest.fixture(scope="module")
-def sling():
-    return checks.sling_of(checks.solid(Bench(load(DEFAULTS))))
+def sling(bench):
+    return checks.sling_of(checks.solid(bench))
 
 
 @pytest.fixture(scope="module")

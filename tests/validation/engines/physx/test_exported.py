@@ -7,7 +7,7 @@ from pipeline.base.errors import UserError
 from pipeline.export import usd
 from pipeline.export.replay import Shot
 from pipeline.simulator.cylinder import volumes
-from sling2sim2real import Band, Model, Settings, Theta, export
+from sling2sim2real import export
 from tests.validation.engines.physx import strings
 from tests.validation.engines.physx.strings import StringEngine
 from validation.engines.physx import flight, law
@@ -15,13 +15,6 @@ from validation.engines.physx.exported import Steps, held, job_of, launched, rea
 
 STRETCH, ACROSS = 1.6, 0.8
 DRAWS = np.array([[-0.30, -0.20], [-0.35, -0.15]])
-
-
-@pytest.fixture(scope="module")
-def model(delivered) -> Model:
-    theta = Theta(1.8e5, 0.47, 2.4e-3, 0.7, 0.6)
-    band = Band(mass=0.023, diameter=0.010, rest_length=0.52, name="toy")
-    return Model(band, theta, settings=Settings.coarse())
 
 
 @pytest.fixture(scope="module")

@@ -6,18 +6,10 @@ import numpy as np
 import pytest
 
 from pipeline.export.mesh import Tube
-from pipeline.params import load
-from pipeline.simulator.model import ClampedBand
-from tests.project import DEFAULTS, ROOT
+from tests.project import ROOT
 from validation.engines.physx import law
 
 YOUNG, POISSON = 2.2e5, 0.45
-
-
-@pytest.fixture(scope="module")
-def sling():
-    params = load(DEFAULTS)
-    return ClampedBand.of(params.bands["band1"], params.setup, params.sling)
 
 
 def turn(seed: int) -> np.ndarray:

@@ -8,19 +8,12 @@ from pipeline.export import usd
 from pipeline.export.match import compared, proof_draws
 from pipeline.export.mesh import Tube
 from pipeline.export.usd import UsdBand, near_draws
-from sling2sim2real import Band, Model, Settings, Theta, export
+from sling2sim2real import export
 from tests.validation.engines.physx import strings
 from tests.validation.engines.physx.strings import StringEngine
 from validation.engines.physx import flight, match
 
 POISSON = 0.47
-
-
-@pytest.fixture(scope="module")
-def model(delivered) -> Model:
-    theta = Theta(1.8e5, POISSON, 2.4e-3, 0.7, 0.6)
-    band = Band(mass=0.023, diameter=0.010, rest_length=0.52, name="toy")
-    return Model(band, theta, settings=Settings.coarse())
 
 
 @pytest.fixture(scope="module")

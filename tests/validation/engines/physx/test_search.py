@@ -27,8 +27,6 @@ def searched(tmp_path, monkeypatch):
     monkeypatch.setattr(search.Comparison, "search", fake_search)
     monkeypatch.setattr(search.Comparison, "losses", lambda self, thetas: {})
     monkeypatch.setattr(search, "release", lambda: "0")
-    context = {"versions": {}}
-    monkeypatch.setattr(search, "environment", lambda _, command: context | {"command": command})
     monkeypatch.setattr(sys, "argv", ["search", "band1", "--params", str(DEFAULTS)])
     monkeypatch.chdir(tmp_path)
     return tmp_path / "reports/validation/physx-band1.json"

@@ -1,0 +1,15 @@
+import pytest
+
+from pipeline.params import Params
+from pipeline.simulator.model import ClampedBand
+from validation.simulator.finding import Bench
+
+
+@pytest.fixture(scope="session")
+def bench(params: Params) -> Bench:
+    return Bench(params)
+
+
+@pytest.fixture(scope="session")
+def sling(params: Params) -> ClampedBand:
+    return ClampedBand.of(params.bands["band1"], params.setup, params.sling)

@@ -1,0 +1,57 @@
+"""Reports of scripts: figures as plain JSON, with machine, versions, command and code."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.base.code import ROOT
+from pipeline.base.environment import environment
+from pipeline.base.files import write_json
+
+
+def write_report(
+    path: Path,
+    content: Mapping,
+    arguments: str = "",
+    *,
+    device: str = "cpu",
+    versions: Mapping[str, str] | None = None,
+    digits: int | None = None,
+) -> dict:
+    """Write what a script has found, and what it belongs to.
+
+    Args:
+        path: The file.
+        content: Figures by name; one that `environment` names too stands in its place.
+        arguments: Of the command, which else is that of the script that calls this.
+        device: That was measured.
+        versions: Of packages beside the usual ones.
+        digits: Of every float.
+
+    Returns:
+        What the file holds.
+    """
+    script = Path(sys._getframe(1).f_code.co_filename).resolve()
+    module = ".".join(script.relative_to(ROOT).with_suffix("").parts).removesuffix(".__main__")
+    provenance = environment(device, f"python -m {module} {arguments}".rstrip(), script)
+    provenance["versions"] |= versions or {}
+    report = provenance | plain(content, digits)
+    write_json(path, report)
+    return report
+
+
+def plain(value: object, digits: int | None = None):
+    """Convert for JSON: NumPy's numbers to Python's, not finite to null; floats to some digits."""
+    if isinstance(value, dict):
+        return {str(key): plain(part, digits) for key, part in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [plain(part, digits) for part in value]
+    if isinstance(value, (float, np.floating)):
+        if not np.isfinite(value):
+            return None
+        return float(value) if digits is None else float(f"{value:.{digits}g}")
+    return value.item() if isinstance(value, np.generic) else value

@@ -14,10 +14,11 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from pipeline.params.lab import Tool
-from pipeline.recording.events import MARGIN, SETTLE
 from pipeline.recording.geometry import Geometry
+from pipeline.recording.grasp import MARGIN
 from pipeline.recording.motion import Motion
 from pipeline.recording.pulls import Pull
+from pipeline.recording.release import SETTLE
 from pipeline.recording.tare import load_per_mass
 
 LONGEST = 0.1  # s of either sign

@@ -20,7 +20,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from os import SEEK_END
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -43,9 +45,8 @@ PLAYS = re.compile(  # types that may play a role; messages of others are counte
     "Wrench|Pose|Twist|JointState|FrankaState|FrankaRobotState|Image|Camera(Info|Calibration)"
     "|FrameTransform|TFMessage"
 )
-IDLE = re.compile(
-    r"(?<![a-z])(infra|ir|fisheye|mask|debug)(?![a-z])"
-)  # of cameras that play no role
+# Of cameras that play no role.
+IDLE = re.compile(r"(?<![a-z])(infra|ir|fisheye|mask|debug)(?![a-z])")
 LONGEST = 86_400 * 10**9  # ns that a recording lasts
 KEPT = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 NO_SCHEMA = kinds.Schema(id=0, data=b"", encoding="", name="")
@@ -100,26 +101,25 @@ def _read(path: Path, part: Path, held: int) -> tuple[Container, int]:
 def _one_of(path: Path, read: list[Container]) -> Container:
     """The parts of a bag as one recording; what is said of a part names it."""
     parts = bag.parts_of(path)
-    channels: dict[tuple, Channel] = {}
-    for container in read:
-        for channel in container.channels:
-            merged = channels.setdefault(
-                _kind(channel), replace(channel, log_times=[], payloads=[])
-            )
-            merged.log_times += channel.log_times
-            merged.payloads += channel.payloads
+    channels = _merged(channel for container in read for channel in container.channels)
     named = list(zip(parts, read, strict=True))
     losses = [f"{part.name}: {loss}" for part, contents in named for loss in contents.losses]
     whole = f"all {len(parts)} parts of the bag were read, from {parts[0].name} on"
     notes = [] if path.is_dir() else [whole]
     notes += dict.fromkeys(note for contents in read for note in contents.notes)
-    return Container(path, list(channels.values()), [*bag.missing_parts(path), *losses], notes)
+    return Container(path, channels, [*bag.missing_parts(path), *losses], notes)
 
 
-def _kind(channel: Channel) -> tuple:
-    """What is equal in channels of one topic."""
-    schema = channel.schema
-    return channel.topic, schema.name, schema.encoding, schema.data, channel.encoding
+def _merged(channels: Iterable[Channel]) -> list[Channel]:
+    """Channels of one topic, schema and encoding as one."""
+    by_kind: dict[tuple, Channel] = {}
+    for channel in channels:
+        schema = channel.schema
+        kind = channel.topic, schema.name, schema.encoding, schema.data, channel.encoding
+        merged = by_kind.setdefault(kind, replace(channel, log_times=[], payloads=[]))
+        merged.log_times += channel.log_times
+        merged.payloads += channel.payloads
+    return list(by_kind.values())
 
 
 @dataclass
@@ -214,13 +214,11 @@ class _Contents:
     def _name(self, definition: kinds.Schema | kinds.Channel) -> None:
         """The first schema or channel of its number counts, by a name that can be shown."""
         if isinstance(definition, kinds.Schema):
-            self.schemas.setdefault(
-                definition.id, replace(definition, name=printable(definition.name))
-            )
+            shown = replace(definition, name=printable(definition.name))
+            self.schemas.setdefault(shown.id, shown)
         else:
-            self.definitions.setdefault(
-                definition.id, replace(definition, topic=printable(definition.topic))
-            )
+            shown = replace(definition, topic=printable(definition.topic))
+            self.definitions.setdefault(shown.id, shown)
 
     def _open(self, data: bytes) -> None:
         """The records of a chunk. Raises Damaged."""
@@ -242,20 +240,24 @@ class _Contents:
         definition = self.definitions.get(number)
         schema = self.schemas.get(definition.schema_id) if definition else None
         idle = schema and schema.name and not PLAYS.search(schema.name)
-        idle = idle or (self.shed and definition and IDLE.search(definition.topic.lower()))
+        idle = idle or (self.shed and self._idle(number))
         payload = b"" if idle else data[start + of.MESSAGE.size : end]
         channel = self.channels.setdefault(number, Channel("", NO_SCHEMA, ""))
         channel.log_times.append(log_time)
         channel.payloads.append(payload)
         self._hold(len(payload) + OVERHEAD)
 
+    def _idle(self, number: int) -> bool:
+        """Whether a channel's topic plays no role, by its name."""
+        definition = self.definitions.get(number)
+        return bool(definition and IDLE.search(definition.topic.lower()))
+
     def _hold(self, size: int) -> None:
         self.held += size
         if self.held > MOST and not self.shed:
             self.shed = True
             for number, channel in self.channels.items():
-                definition = self.definitions.get(number)
-                if definition and IDLE.search(definition.topic.lower()):
+                if self._idle(number):
                     self.held -= sum(map(len, channel.payloads))
                     channel.payloads[:] = [b""] * len(channel.payloads)
         if self.held > MOST:
@@ -268,8 +270,7 @@ class _Contents:
 
     def _joined(self) -> tuple[list[Channel], list[str]]:
         """Channels by topic, and in words what could not be joined."""
-        by_key: dict[tuple, Channel] = {}
-        losses = []
+        named, losses = [], []
         for number, channel in self.channels.items():
             definition, count = self.definitions.get(number), counted(len(channel.payloads))
             if definition is None:
@@ -281,24 +282,13 @@ class _Contents:
                 continue
             encoding = definition.message_encoding
             schema = schema or guessed(definition.topic, encoding, channel.payloads) or NO_SCHEMA
-            key = (
-                definition.topic,
-                schema.name,
-                schema.encoding,
-                schema.data,
-                definition.message_encoding,
-            )
-            merged = by_key.setdefault(
-                key, Channel(definition.topic, schema, definition.message_encoding)
-            )
-            merged.log_times += channel.log_times
-            merged.payloads += channel.payloads
+            named.append(replace(channel, topic=definition.topic, schema=schema, encoding=encoding))
         for number, count in self.ambiguous.items():
             topic = self.definitions[number].topic
             losses.append(
                 f"channel {number} is {topic} and then another: {counted(count)} dropped since"
             )
-        return list(by_key.values()), losses
+        return _merged(named), losses
 
     def _summary_holds(self) -> bool:
         """Whether the summary can be believed."""
@@ -348,11 +338,7 @@ class _Contents:
         """What costs none; `trusted`: whether the file's summary can be believed."""
         notes = []
         if self.shed:
-            left = [
-                definition.topic
-                for definition in self.definitions.values()
-                if IDLE.search(definition.topic.lower())
-            ]
+            left = [d.topic for number, d in self.definitions.items() if self._idle(number)]
             notes.append(
                 f"more than {MOST / 2**30:.0f} GiB of messages: without those of"
                 f" {few(sorted(left), NAMED)}"
@@ -385,9 +371,8 @@ class _Contents:
             a, b = wanted.get(number, 0), read.get(number, 0)
             definition = self.definitions.get(number)
             if a != b:
-                off.append(
-                    f"{b} of {a} of {definition.topic if definition else f'channel {number}'}"
-                )
+                of_what = definition.topic if definition else f"channel {number}"
+                off.append(f"{b} of {a} of {of_what}")
         total = sum(read.values())
         if not off and total != statistics[-1].message_count:
             off.append(f"{total} of {statistics[-1].message_count}")
@@ -397,9 +382,7 @@ class _Contents:
 
     def _log_times(self) -> np.ndarray:
         """log_times [ns] without those that are damage."""
-        times = np.array(
-            [t for channel in self.channels.values() for t in channel.log_times], float
-        )
+        times = np.array([*chain.from_iterable(c.log_times for c in self.channels.values())], float)
         return times[np.abs(times - np.median(times)) < LONGEST] if len(times) else times
 
 

@@ -98,11 +98,7 @@ class _Chooser:
         if role not in self.fitting:
             self.problems = []
             candidates = [self._candidate(role, channel) for channel in self.container.channels]
-            suiting = [
-                candidate
-                for candidate in candidates
-                if candidate is not None and self._suits(role, candidate)
-            ]
+            suiting = [one for one in candidates if one is not None and self._suits(role, one)]
             self.fitting[role] = suiting, self.problems
         candidates, problems = self.fitting[role]
         self.problems = [*problems]
@@ -189,22 +185,15 @@ class _Chooser:
         ranked = []
         for candidate in candidates:
             camera = candidate.typical.value.camera
-            beside, of_color = (
-                _beside(candidate.topic, topic),
-                _beside(candidate.topic, color.channel.topic),
-            )
+            beside = _beside(candidate.topic, topic)
+            of_color = _beside(candidate.topic, color.channel.topic)
             beside_it = beside and (role == "color" or not of_color)
             info_frame = camera.frame or (color.typical().frame if of_color else "")
             fits = size is None or size == (camera.width, camera.height)
             if beside_it or (info_frame == frame and (fits or beside)):
                 why = f"beside {topic}" if beside else f"of the frame and size of {topic}"
-                merit = (
-                    beside_it,
-                    info_frame == frame,
-                    fits,
-                    beside,
-                    len(candidate.choice.channel.payloads),
-                )
+                count = len(candidate.choice.channel.payloads)
+                merit = beside_it, info_frame == frame, fits, beside, count
                 ranked.append((merit, [-ord(c) for c in candidate.topic], why, candidate.choice))
             else:
                 pixels = f", {size[0]} x {size[1]}" if size else ""

@@ -86,11 +86,9 @@ def _hand(pull: Pull, rays: np.ndarray, k: int, time: float) -> np.ndarray:
     middle = pose.inverse().apply(palm)
     if middle[2] < 2 * REACH:
         return nothing
-    size = np.array([camera.width, camera.height])
     half = 1.3 * REACH * np.diag(camera.matrix)[:2] / middle[2]
     pixel = camera.project(middle[None])[0]
-    low, high = (np.clip(pixel + side * half, 0, size).astype(int) for side in (-1, 1))
-    window = slice(low[1], high[1]), slice(low[0], high[0])
+    window = camera.window(pixel - half, pixel + half)
     depth = pull.recording.depth_picture(k)
     if depth is None:
         return nothing

@@ -15,7 +15,7 @@ from pipeline.base.errors import UserError
 from pipeline.params.lab import SetupParams
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import read_calibration
-from pipeline.recording.input.container import Channel
+from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.decode import (
     Decoder,
     Message,

@@ -15,7 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
-from pipeline.recording.input.container import Channel
+from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.decode import Unreadable
 from pipeline.recording.input.readings import Picture, Reading
 

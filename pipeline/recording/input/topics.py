@@ -14,7 +14,8 @@ from pipeline.recording.input import images
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import Camera, camera_from
 from pipeline.recording.input.company import Company
-from pipeline.recording.input.container import Channel, Container
+from pipeline.recording.input.container import Container
+from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.decode import Unreadable, decoder, message_reader
 from pipeline.recording.input.roles import (
     OPTIONAL,

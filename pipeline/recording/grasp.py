@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.recording.motion import interpolated
 
 Opening = tuple[np.ndarray, np.ndarray]  # of the gripper: times [s] and opening, both (G,)
 
@@ -140,8 +141,8 @@ def _outward(t: np.ndarray, opening: np.ndarray, release: float) -> float:
 def _end_of_rest(t: np.ndarray, path: np.ndarray, grasp: float) -> float:
     """`grasp`, or the end of the last rest before it if the hand moves then."""
     times = np.arange(grasp - LIMITS.late, grasp + 1.5 * LIMITS.step, LIMITS.step)
-    at = np.stack([np.interp(times, t, axis) for axis in path.T], axis=1)
-    resting = np.linalg.norm(np.diff(at, axis=0), axis=1) < LIMITS.rest * LIMITS.step
+    ways = np.diff(interpolated(times, t, path), axis=0)
+    resting = np.linalg.norm(ways, axis=1) < LIMITS.rest * LIMITS.step
     inside = (times[:-1] >= t[0]) & resting
     if inside[-2:].any() or not inside.any():
         return grasp

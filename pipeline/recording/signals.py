@@ -15,7 +15,7 @@ from pipeline.params.lab import Tool
 from pipeline.params.recording import EpisodeParams
 from pipeline.recording.geometry import turned
 from pipeline.recording.grasp import MARGIN
-from pipeline.recording.motion import VELOCITY_WINDOW, Motion, expect_dense
+from pipeline.recording.motion import VELOCITY_WINDOW, Motion, expect_dense, interpolated
 from pipeline.recording.pulls import Pull
 from pipeline.recording.tare import band_force
 from pipeline.recording.tool_inertia import ToolInertia
@@ -119,8 +119,7 @@ class Signals:
 
     def hand(self, times: np.ndarray | float) -> np.ndarray:
         """Tool centre point at any times, shape (..., 3)."""
-        axes = [np.interp(times, self.path_time, axis) for axis in self.path.T]
-        return np.stack(axes, axis=-1)
+        return interpolated(times, self.path_time, self.path)
 
     def opening_at(self, time: float) -> float:
         """Distance between the fingers [m], 0 where it was not recorded."""

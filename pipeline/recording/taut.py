@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pipeline.recording.motion import interpolated
 from pipeline.recording.view import Scene
 
 PULLED = 1.1  # least stretch: a band that is drawn less sags
@@ -79,8 +80,7 @@ def samples_of(
         ways = hand - scene.tips
         lengths = np.linalg.norm(ways, axis=1)
         both = np.linalg.norm((ways / lengths[:, None]).sum(axis=0))
-        force = np.array([np.interp(time, signals.time, axis) for axis in signals.force.T])
-        tension = np.linalg.norm(force) / both
+        tension = np.linalg.norm(interpolated(time, signals.time, signals.force)) / both
         away = (cloud[:, None] - scene.tips).astype(float)  # (P, 2, 3)
         along = np.einsum("psi,si->ps", away, ways / lengths[:, None])
         aside = np.linalg.norm(away - along[..., None] * ways / lengths[:, None], axis=-1)

@@ -21,30 +21,17 @@ LEAD_IN = 0.2  # s of the empty hand before the grasp, at least: the force is ta
 
 @dataclass(frozen=True)
 class GraspLimits:
-    """Thresholds of the fingers and of the hand.
+    """Thresholds of the fingers and of the hand, each with its unit and what it is for."""
 
-    | name | unit | what for |
-    |---|---|---|
-    | `stroke` | the gripper's | fingers that move less (2 mm, 0.1 degrees) did not move |
-    | `jitters` | robust deviations | nor did those that move less than their own noise allows |
-    | `held` | s before the release | the fingers are closed then; their median is "closed" |
-    | `late` | s | a gripper's topic comes so much later than what it tells, at most |
-    | `opened` | of the range | fingers that moved by it have opened, or were open |
-    | `parts` | | they are still closed within one such part of the stroke: a band gives way |
-    | `lift` | m | a hand that is so much higher than at its lowest has lifted |
-    | `rest` | m/s | a slower hand rests |
-    | `step` | s | over which that speed is taken: some samples of any pose |
-    """
-
-    stroke: float = 0.002
-    jitters: float = 12.0
-    held: float = 1.0
-    late: float = 0.5
-    opened: float = 0.2
-    parts: float = 10.0
-    lift: float = 0.005
-    rest: float = 0.02
-    step: float = 0.02
+    stroke: float = 0.002  # m, rad, ...: fingers that move less did not move
+    jitters: float = 12.0  # robust deviations of the opening's noise: nor did those that move less
+    held: float = 1.0  # s before the release: the median opening then is that of closed fingers
+    late: float = 0.5  # s by which the gripper's topic may come late
+    opened: float = 0.2  # of the range: fingers that moved by so much were or are open
+    parts: float = 10.0  # of the stroke: within one of them from closed, fingers are still closed
+    lift: float = 0.005  # m: a hand that is so much higher than at its lowest has lifted
+    rest: float = 0.02  # m/s: a slower hand rests
+    step: float = 0.02  # s over which that speed is taken
 
 
 LIMITS = GraspLimits()

@@ -24,42 +24,23 @@ RUBBER = 0.006  # s: pads open in less, and rubber follows them at once
 
 @dataclass(frozen=True)
 class ReleaseLimits:
-    """Thresholds of the force. The drop is from the held force to that of the free hand.
+    """Thresholds of the force; the drop is from the held force to that of the free hand."""
 
-    | name | unit | what for |
-    |---|---|---|
-    | `pull` | N | what drops by less was not drawn |
-    | `sudden` | of a lasting change | so much of it comes at once where a band is let go |
-    | `slip` | of the largest drop | a sudden drop from it on is worth a word |
-    | `free` | of the held force | a free hand may still feel it: the zero drifts, the tool turns |
-    | `noise` | standard deviations | a sample that is off by more than these is no longer held |
-    | `held` | of the drop | and by more than this: a held force creeps |
-    | `least_noise` | of the drop | of samples without any: a straight fall is but a model |
-    | `gap` | periods | force must not be missing for longer around the release |
-    | `before` | s, and samples | the fall may begin so long before it stands out of the noise |
-    | `slowest` | s | no band is let go more slowly |
-    | `looked` | of the drop | the fall's beginning is told by this much: later a sensor may ring |
-    | `rings` | of the drop | by which it may ring |
-    | `timed` | of the held force | from it down to it a fall is timed: what rings is below |
-    | `periods` | | a fall that is timed to more of them may be a filter's |
-    | `alike` | correlation | of neighbouring samples' noise, from which a filter made it |
-    """
-
-    pull: float = 0.5
-    sudden: float = 0.5
-    slip: float = 0.2
-    free: float = 0.3
-    noise: float = 6.0
-    held: float = 0.02
-    least_noise: float = 0.003
-    gap: float = 3.5
-    before: tuple[float, int] = (0.006, 6)
-    slowest: float = 0.03
-    looked: float = 0.5
-    rings: float = 0.15
-    timed: tuple[float, float] = (0.9, 0.3)
-    periods: float = 3.0
-    alike: float = 0.4
+    pull: float = 0.5  # N: what drops by less was not drawn
+    sudden: float = 0.5  # of a lasting change that comes at once where a band is let go
+    slip: float = 0.2  # of the largest drop, from which another sudden one is worth a word
+    free: float = 0.3  # of the held force that a free hand may still feel
+    noise: float = 6.0  # standard deviations: a sample that is off by more is no longer held,
+    held: float = 0.02  # of the drop: if it is off by more than this as well
+    least_noise: float = 0.003  # of the drop: no fall is so straight that samples tell more
+    gap: float = 3.5  # periods around the release in which force must not be missing
+    before: tuple[float, int] = (0.006, 6)  # s, samples: so early may begin what noise hides
+    slowest: float = 0.03  # s: no band is let go more slowly
+    looked: float = 0.5  # of the drop: what comes later does not tell the fall's beginning,
+    rings: float = 0.15  # of the drop: for the sensor may ring by this
+    timed: tuple[float, float] = (0.9, 0.3)  # of the held force, between which a fall is timed
+    periods: float = 3.0  # that it takes at least where a filter made it,
+    alike: float = 0.4  # correlation of neighbouring samples' noise: and that the filter leaves
 
 
 LIMITS = ReleaseLimits()

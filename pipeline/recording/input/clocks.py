@@ -37,42 +37,23 @@ from scipy.ndimage import median_filter
 
 @dataclass(frozen=True)
 class ClockLimits:
-    """Thresholds of clocks.
+    """Thresholds of clocks, each with its unit and what it is for."""
 
-    | name | unit | what for |
-    |---|---|---|
-    | `step` | s | a smaller step looks like a delay of receipt |
-    | `window` | s of log_time | on each side of a break, whose least delay counts |
-    | `around` | messages | in that window, at least |
-    | `even` | of the period | intervals of an even rate differ by less, in the median |
-    | `piled` | of the period | messages that had to wait come within it |
-    | `agree` | s | between a step by continuity and the same by log_time |
-    | `far` | s | from a stamp to those around it: it is damage |
-    | `alone` | s | from one or two messages at a topic's end to the rest of it: so are they |
-    | `disorder` | messages | so many that go back: nobody set a clock, the file has no order |
-    | `interleaved` | times | two runs of messages that alternate so often cover the same time |
-    | `seconds` | | of least delays, from which a line through them tells a drift |
-    | `sure` | standard errors | from which a clock drifts |
-    | `drifted` | s over the recording | from which its drift matters |
-    | `known` | s over the recording | to which a rate must be known to be taken out |
-    | `tolerance` | s | between the clocks of two topics: transport and drivers take less |
-    """
-
-    step: float = 0.010
-    window: float = 1.0
-    around: int = 3
-    even: float = 0.2
-    piled: float = 0.2
-    agree: float = 0.003
-    far: float = 1.0
-    alone: float = 60.0
-    disorder: int = 10
-    interleaved: int = 6
-    seconds: int = 5
-    sure: float = 3.0
-    drifted: float = 0.003
-    known: float = 0.001
-    tolerance: float = 0.5
+    step: float = 0.010  # s: a smaller step looks like a delay of receipt
+    window: float = 1.0  # s of log_time on each side of a break, of which the least delay counts
+    around: int = 3  # messages at least in that window
+    even: float = 0.2  # of the period: intervals of an even rate differ by less, in the median
+    piled: float = 0.2  # of the period: messages that had to wait come within it
+    agree: float = 0.003  # s between a step by continuity and the same by log_time
+    far: float = 1.0  # s from a stamp to those around it: it is damage
+    alone: float = 60.0  # s from one or two messages at a topic's end to the rest: so are they
+    disorder: int = 10  # messages that go back: nobody set a clock so often, the file has no order
+    interleaved: int = 6  # times that two runs of messages alternate which cover the same time
+    seconds: int = 5  # of least delays: a line through fewer tells no drift
+    sure: float = 3.0  # standard errors from which a clock drifts
+    drifted: float = 0.003  # s over the recording from which its drift matters
+    known: float = 0.001  # s over the recording to which a rate must be known to be taken out
+    tolerance: float = 0.5  # s between the clocks of two topics: transport and drivers take less
 
 
 LIMITS = ClockLimits()

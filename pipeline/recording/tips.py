@@ -222,7 +222,8 @@ def _fit(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Huber's estimate by reweighting: state (15,), covariance (15, 15), residuals of points."""
     scale, state = taut.WITHIN * float(samples.radius.max()), state.copy()
-    for _ in range(ROUNDS):
+    left = ROUNDS
+    while True:
         off, slopes = model(samples, state, eye)  # (M, P), (M, P, 15)
         scale = _scale(off, scale)
         sure = samples.weight * _huber(off, scale)
@@ -234,7 +235,8 @@ def _fit(
         pull += (state - PRIOR_MEAN) / PRIOR_SPREAD**2
         step = np.linalg.solve(curvature, pull)
         state -= step
-        if np.abs(step).max() < 1e-7:
+        left -= 1
+        if not left or np.abs(step).max() < 1e-7:
             break
     # Cells of the hand's path are independent, and the hanging band; points in them are not.
     pulls = np.zeros((samples.cell.max() + 1, len(state)))

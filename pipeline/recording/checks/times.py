@@ -92,11 +92,11 @@ def findings(done: Processed) -> Iterator[Finding]:
             yield CLOCK.found(f"{what} by the times of receipt")
     yield from of_drift(done)
     yield from of_delays(done)
-    pose = done.delays.pose
-    if (pose.left or 0.0) > OPEN:
+    left = done.delays.pose.left or 0.0
+    if left > OPEN:
         yield UNKNOWN.found(
             f"the pose's clock against the force's is not known better than"
-            f" ± {1e3 * (pose.left or 0.0):.1f} ms, and each ms is 0.4 % of the modulus"
+            f" ± {1e3 * left:.1f} ms, and each ms is 0.4 % of the modulus"
         )
     if done.delays.conflict:
         yield CONFLICT.found(done.delays.conflict)

@@ -8,7 +8,7 @@ from functools import cached_property
 from os.path import commonprefix
 
 from pipeline.recording.input import sets
-from pipeline.recording.input.roles import COMMANDS, Candidate, Choice
+from pipeline.recording.input.roles import Candidate, Choice
 
 DEVICE = ("wrench", "pose", "twist", "gripper")  # of one arm
 LEAST_FOLLOWS = 0.1  # share of the force's steps below which they show no hand
@@ -42,7 +42,7 @@ class Company:
             return None, what
         if len(meant) > 1:
             meant = _some(self._alive, meant)
-        meant = _some(lambda one: not set(one.doubts) & set(COMMANDS), meant)
+        meant = _some(lambda one: not one.commanded, meant)
         if role == "wrench" and len(meant) > 1:
             meant = _some(self._falls, meant)
         elif role == "pose" and len(meant) > 1:
@@ -130,15 +130,14 @@ class Company:
         wrench = chosen["wrench"]
         mine = (wrench.channel.topic, pose.topic, pose.typical.frame, wrench.typical().frame)
         for force in self.fitting("wrench"):
-            if not sets.apart((force.topic, force.typical.frame), mine, self.sides):
-                continue
-            if set(force.doubts) & set(COMMANDS) or not self._falls(force):
+            its = force.topic, force.typical.frame
+            if not sets.apart(its, mine, self.sides) or force.commanded or not self._falls(force):
                 continue
             for hand in self.fitting("pose"):
                 names = hand.topic, hand.typical.frame
                 if not sets.apart(names, mine, self.sides) or not self._alive(hand):
                     continue
-                if not sets.apart(names, (force.topic, force.typical.frame), self.sides):
+                if not sets.apart(names, its, self.sides):
                     return f"{force.topic} with {hand.topic} shows a release too"
         return ""
 

@@ -1,4 +1,4 @@
-"""When the hand grasps the band, by thresholds on the fingers' stroke or on the hand's lift.
+"""The moment at which the hand grasps the band: thresholds on the fingers' stroke, or on the lift.
 
 Fingers report in whatever unit, and some numbers grow when the fingers close: thresholds are shares
 of the stroke, and the sign is read from what they did before they held.

@@ -1,4 +1,4 @@
-"""When the band is let go: a change point of the force that lasts and leaves the hand free.
+"""The release of the band: a change point of the force that lasts and leaves the hand free.
 
 First roughly: peaks of the difference of means before and after (`change`). Then, around the one
 that is the release, the onset of the fall between samples, as a mean over all straight falls that

@@ -35,20 +35,20 @@ class Company:
             return self._camera(role, candidates, chosen)
         if not candidates:
             return None, ""
-        meant = [one for one in candidates if not any(self._strangers(one, chosen))]
+        meant = [topic for topic in candidates if not any(self._strangers(topic, chosen))]
         if not meant:
             other, of = next(self._strangers(candidates[0], chosen))
             what = f"{candidates[0].topic} is of another device than the {other}'s topic {of}"
             return None, what
         if len(meant) > 1:
             meant = _some(self._alive, meant)
-        meant = _some(lambda one: not one.commanded, meant)
+        meant = _some(lambda topic: not topic.commanded, meant)
         if role == "wrench" and len(meant) > 1:
             meant = _some(self._falls, meant)
         elif role == "pose" and len(meant) > 1:
             meant = self._followed(meant, chosen["wrench"])
         elif role == "gripper" and len(meant) > 1:
-            meant = _some(lambda one: self._opens(one, chosen["wrench"]), meant)
+            meant = _some(lambda topic: self._opens(topic, chosen["wrench"]), meant)
         best = max(meant, key=Candidate.merit)
         return best, self._tie(best, chosen) if role == "pose" else ""
 
@@ -149,7 +149,7 @@ class Company:
         if len(candidates) < 2:
             return (candidates[0] if candidates else None), ""
         live = _some(self._alive, candidates)
-        placed = _some(lambda one: one.typical.frame in self.frames, live)
+        placed = _some(lambda topic: topic.typical.frame in self.frames, live)
         if role == "depth":
             color = chosen["color"]
             topic, frame = color.channel.topic, color.typical().frame
@@ -157,7 +157,7 @@ class Company:
             most = max(near.values())
             return max((o for o in placed if near[id(o)] == most), key=Candidate.merit), ""
         depths = self.fitting("depth")
-        paired = [one for one in placed if self._partner(one, depths)]
+        paired = [topic for topic in placed if self._partner(topic, depths)]
         best = max(paired or placed, key=Candidate.merit)
         return best, self._other_camera(best, paired, depths)
 
@@ -175,16 +175,15 @@ class Company:
             if len(color.doubts) > len(best.doubts) or color.topic == best.topic:
                 continue
             for depth in depths:
-                near, of_best = (
-                    self._near(depth, one.topic, one.typical.frame) for one in (color, best)
-                )
-                if near > of_best and self._alive(depth):
+                near = self._near(depth, color.topic, color.typical.frame)
+                nearer = near > self._near(depth, best.topic, best.typical.frame)
+                if nearer and self._alive(depth):
                     return f"{color.topic} with {depth.topic} is a camera too"
         return ""
 
 
 def _some(suits: Callable[[Candidate], bool], candidates: list[Candidate]) -> list[Candidate]:
-    """Those that suit, or all where none does."""
+    """The candidates that suit, or all where none does."""
     return [candidate for candidate in candidates if suits(candidate)] or candidates
 
 

@@ -49,15 +49,14 @@ def put_on_one_clock(raw: dict[str, Raw], late: Mapping[str, float]) -> None:
 
 def _take_rewinds_out(raw: dict[str, Raw]) -> None:
     """Steps back of the machine's clock, stamps and log_time alike."""
-    for series, jumps in _agreed(raw, clocks.rewinds).items():
-        role = raw[series]
-        role.stamp = clocks.without(role.stamp, jumps)
-        role.log = clocks.without(role.log, jumps)
+    for role, jumps in _agreed(raw, clocks.rewinds).items():
+        series = raw[role]
+        series.stamp = clocks.without(series.stamp, jumps)
+        series.log = clocks.without(series.log, jumps)
         for step in jumps:
-            at, size = (role.log[step.index] - role.log[0]) * 1e-9, step.size * 1e-9
-            role.notes.append(
-                f"step of its machine's clock of {size:+.4f} s at {at:.2f} s taken out"
-            )
+            at, size = (series.log[step.index] - series.log[0]) * 1e-9, step.size * 1e-9
+            what = f"step of its machine's clock of {size:+.4f} s at {at:.2f} s taken out"
+            series.notes.append(what)
 
 
 def _take_bursts_out(raw: Raw) -> None:
@@ -76,20 +75,21 @@ def _take_bursts_out(raw: Raw) -> None:
 
 
 def _take_steps_out(raw: dict[str, Raw]) -> None:
-    """Steps of the stamps' clock alone; the segment that fits the other topics is right."""
+    """Steps of the stamps' clock alone; the segment that fits the other topics is right.
+
+    It is the one whose least delay of receipt is nearest to the median of those of topics without a
+    step, or else to that of its own longest segment.
+    """
     agreed = _agreed(raw, clocks.steps)
     start = min(series.log.min() for series in raw.values())
-    usual = {}
-    for role, samples in raw.items():
-        segment = clocks.segments(len(samples.stamp), agreed.get(role, []))
-        longest = np.argmax(np.bincount(segment))
-        usual[role] = (samples.log - samples.stamp)[segment == longest].min()
+    steady = [series for role, series in raw.items() if role not in agreed]
+    sound = [(series.log - series.stamp).min() for series in steady]
     for role, jumps in agreed.items():
         samples = raw[role]
-        segment = clocks.segments(len(samples.stamp), jumps)
-        least = [(samples.log - samples.stamp)[segment == k].min() for k in range(len(jumps) + 1)]
-        others = np.median([usual[other] for other in raw if other not in agreed] or [usual[role]])
-        base = int(np.argmin(np.abs(np.array(least, float) - others)))
+        segment, delay = clocks.segments(len(samples.stamp), jumps), samples.log - samples.stamp
+        least = [delay[segment == k].min() for k in range(len(jumps) + 1)]
+        usual = np.median(sound or [least[np.argmax(np.bincount(segment))]])
+        base = int(np.argmin(np.abs(np.array(least, float) - usual)))
         samples.stamp = clocks.without(samples.stamp, jumps, base)
         for step in jumps:
             at, size = (step.log - start) * 1e-9, step.size * 1e-9
@@ -123,6 +123,11 @@ def _agreed(
 
 
 def _on_one_clock(raw: dict[str, Raw], late: Mapping[str, float]) -> None:
+    """Topics on another clock than the wrench's, by their least delays of receipt.
+
+    What controllers publish is put right; force and pictures that differ among themselves are
+    refused, and the message names that which is furthest from the median of all topics.
+    """
     wrench = raw["wrench"]
     offsets = {
         role: clocks.offset(series.stamp, series.log, wrench.stamp, wrench.log)

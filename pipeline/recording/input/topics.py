@@ -98,8 +98,8 @@ class _Chooser:
         """Candidates that could play the role by what they are, looked for once."""
         if role not in self.fitting:
             self.problems = []
-            candidates = [self._candidate(role, channel) for channel in self.container.channels]
-            suiting = [one for one in candidates if one is not None and self._suits(role, one)]
+            fitting = [self._candidate(role, channel) for channel in self.container.channels]
+            suiting = [topic for topic in fitting if topic is not None and self._suits(role, topic)]
             self.fitting[role] = suiting, self.problems
         candidates, problems = self.fitting[role]
         self.problems = [*problems]

@@ -121,6 +121,7 @@ def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = Non
     drops, (_, far) = _Drops.of(t, force, gripper), reach(t)
     center = drops.release(t)
 
+    # The force along the drop: while held, and once the hand is free.
     quiet = slice(max(0, center - 6 * far), center - far)
     settled = slice(min(center + far, len(t) - 1), min(center + 6 * far, len(t)))
     hold, free = force[quiet].mean(axis=0), force[settled].mean(axis=0)
@@ -129,6 +130,7 @@ def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = Non
     level, noise = along[quiet].mean(), sample_noise(along[quiet])
     threshold = max(LIMITS.noise * noise, LIMITS.held * drop)
 
+    # Half of the fall, and the first sample that is not held any more.
     window = slice(quiet.stop - far, settled.stop)
     half = window.start + int(np.argmax(along[window] < level - drop / 2))
     first = _behind_last(along[:half] > level - threshold, half)
@@ -141,11 +143,7 @@ def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = Non
     fall = (level - along) / drop
     time, error, lasted = _onset(t, fall, first, max(noise / drop, LIMITS.least_noise), period)
     slips = [float(t[i]) for i in drops.at if i < center]
-    high, low = (level - drop * (1 - share) for share in LIMITS.timed)
-    below = along[half:] < low
-    last = half + int(np.argmax(below)) if below.any() else len(along) - 1
-    begin = _crossing(t, along, high, _behind_last(along[:half] > high, half))
-    spread = _crossing(t, along, low, last) - begin
+    spread = _fall_time(t, along, half, *(level - drop * (1 - share) for share in LIMITS.timed))
     filtered = spread > LIMITS.periods * period and (
         spread > RUBBER or _alike(along[quiet]) > LIMITS.alike
     )
@@ -158,6 +156,17 @@ def _behind_last(which: np.ndarray, otherwise: int) -> int:
     """Number of the sample behind the last one that is marked (S,)."""
     marked = np.flatnonzero(which)
     return int(marked[-1]) + 1 if len(marked) else otherwise
+
+
+def _fall_time(t: np.ndarray, x: np.ndarray, half: int, high: float, low: float) -> float:
+    """Time [s] from when x (S,) is last above a value to when it is first below another.
+
+    Args:
+        half: A sample between the two.
+    """
+    below = x[half:] < low
+    last = half + int(np.argmax(below)) if below.any() else len(x) - 1
+    return _crossing(t, x, low, last) - _crossing(t, x, high, _behind_last(x[:half] > high, half))
 
 
 def _crossing(t: np.ndarray, x: np.ndarray, value: float, k: int) -> float:

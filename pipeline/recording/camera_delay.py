@@ -1,17 +1,19 @@
-"""The camera's delay against the pose, by where the hand is seen.
+"""The camera's delay against the pose, by where the hand is seen: ICP over a time offset.
 
-Iterative closest points (ICP) over a time offset. A late picture shows the hand where it was. Its
-points, laid over those of pictures in which the hand rests, are off by the velocity times the
-delay; what they are off by place is a matter of the extrinsics and is fitted beside it. No model of
-the hand is needed, but it must be rigid and turn as the pose says.
+A late picture shows the hand where it was. Its points, laid over those of pictures in which the
+hand rests (`icp`), are off by the velocity times the delay; what they are off by place is a matter
+of the extrinsics and is fitted beside it, by weighted least squares. The delay's error is that of a
+jackknife over blocks of time. No model of the hand is needed, but it must be rigid and turn as the
+pose says.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 from scipy.spatial.transform import Rotation
 
+from pipeline.recording.icp import FEWEST, Surface
+from pipeline.recording.motion import interpolated
 from pipeline.recording.pulls import Pull
 from pipeline.recording.tool_inertia import LONGEST
 
@@ -21,10 +23,6 @@ REST = 4  # pictures with the slowest hand, at each end of the way
 PALM, REACH = 0.08, 0.13  # m: what is looked at around a point so far behind the tool centre point
 FINGERTIPS = 0.015  # m behind the tool centre point that are left to the band
 POINTS = 500  # of the hand in a picture
-FEWEST = 100
-NEIGHBOURS = 12
-FLAT = 0.1  # of the variances of neighbours across and along a surface
-NEAREST = (0.02, 0.01, 0.004, 0.004, 0.004)  # m between points that are laid on each other
 SCATTER = 0.0003  # m from picture to picture, against which the next is weighed
 ASKEW = 0.02  # m that wrong extrinsics may displace a metre of way
 WORST = 0.001  # m from picture to picture that is left: else it is no rigid hand
@@ -33,30 +31,21 @@ ROUNDS, CLOSE = 4, 3e-4  # s
 
 
 def camera_delay(pull: Pull) -> tuple[float, float] | None:
-    """Delay and its standard error [s]; None where the hand is not seen well enough."""
-    recording, motion = pull.recording, pull.motion
-    grasp, release = pull.grasp, pull.release.time
-    stamps = recording.depth.seconds(recording.origin)
-    used = np.flatnonzero((stamps > grasp + LONGEST) & (stamps < release - LONGEST))
-    if len(used) < 2 * BLOCKS:
-        return None
-    used = used[np.linspace(0, len(used) - 1, min(FRAMES, len(used))).round().astype(int)]
-    rays, random = recording.depth_camera.rays().astype(np.float32), np.random.default_rng(0)
-    times, pictures = [], []
-    for k in used:
-        points = random.permutation(_hand(pull, rays, k, float(stamps[k])))
-        if len(points) >= FEWEST:
-            times.append(float(stamps[k]))
-            pictures.append(points)
+    """Delay and its standard error [s]; None where the hand is not seen well enough.
+
+    Both halves of the way are solved apart, from the last delay on, until neither moves it; the
+    error counts how far they differ.
+    """
+    times, pictures = _hands(pull)
     if len(pictures) < 2 * BLOCKS:
         return None
-    times = np.array(times)
+    motion = pull.motion
     grid, _, velocity = motion.velocity()
     delay, steps, errors = 0.0, np.zeros(2), np.full(2, np.inf)
     for _ in range(ROUNDS):
         at = times - delay
         turns, hands = motion.orientation(at), motion.position(at)
-        speed = np.stack([np.interp(at, grid, axis) for axis in velocity.T], axis=-1)
+        speed = interpolated(at, grid, velocity)
         points = [
             _behind(turn.inv().apply(seen - hand))
             for turn, hand, seen in zip(turns, hands, pictures, strict=True)
@@ -74,6 +63,21 @@ def camera_delay(pull: Pull) -> tuple[float, float] | None:
     return delay, float(np.hypot(errors.max(), np.ptp(steps) / 2))
 
 
+def _hands(pull: Pull) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Stamps [s] of pictures while the band is held, and points around the hand in each, (P, 3)."""
+    recording = pull.recording
+    stamps = recording.depth.seconds(recording.origin)
+    held = (stamps > pull.grasp + LONGEST) & (stamps < pull.release.time - LONGEST)
+    used = np.flatnonzero(held)
+    if len(used) < 2 * BLOCKS:
+        return np.zeros(0), []
+    used = used[np.linspace(0, len(used) - 1, min(FRAMES, len(used))).round().astype(int)]
+    rays, random = recording.depth_camera.rays().astype(np.float32), np.random.default_rng(0)
+    seen = [(k, random.permutation(_hand(pull, rays, k, float(stamps[k])))) for k in used]
+    seen = [(k, points) for k, points in seen if len(points) >= FEWEST]
+    return stamps[[k for k, _ in seen]], [points for _, points in seen]
+
+
 def _hand(pull: Pull, rays: np.ndarray, k: int, time: float) -> np.ndarray:
     """Points around the hand in picture k, frame O, (P, 3); none where it does not show the hand.
 
@@ -86,11 +90,9 @@ def _hand(pull: Pull, rays: np.ndarray, k: int, time: float) -> np.ndarray:
     middle = pose.inverse().apply(palm)
     if middle[2] < 2 * REACH:
         return nothing
-    size = np.array([camera.width, camera.height])
     half = 1.3 * REACH * np.diag(camera.matrix)[:2] / middle[2]
     pixel = camera.project(middle[None])[0]
-    low, high = (np.clip(pixel + side * half, 0, size).astype(int) for side in (-1, 1))
-    window = slice(low[1], high[1]), slice(low[0], high[0])
+    window = camera.window(pixel - half, pixel + half)
     depth = pull.recording.depth_picture(k)
     if depth is None:
         return nothing
@@ -115,6 +117,10 @@ def _step(
 ) -> tuple[float, float] | None:
     """Delay and error that are left, against the slowest pictures of one part of the way.
 
+    Each picture gives three equations, weighed by what its surface tells: its displacement is that
+    of the hand as a whole (3 unknowns), of wrong extrinsics by place (9, with a prior) and of the
+    delay by the velocity (1).
+
     Args:
         points: Of the hand in each of K pictures, (P, 3) each, in the hand's frame.
         turns: K rotations of that frame into frame O.
@@ -122,7 +128,7 @@ def _step(
         part: Which pictures belong to that part of the way, (K,).
     """
     slowest = np.flatnonzero(part)[np.argsort(np.linalg.norm(speed[part], axis=1))[:REST]]
-    surface = _Surface(np.vstack([points[i] for i in slowest]))
+    surface = Surface(np.vstack([points[i] for i in slowest]), 8 * POINTS)
     rows, wanted = [], []
     for i in range(len(points)):
         if i in slowest:
@@ -157,40 +163,3 @@ def _step(
     parts = np.array([-solve(np.setdiff1d(everything, block))[-1] for block in blocks])
     error = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((parts - parts.mean()) ** 2))  # jackknife
     return -best[-1], float(error)
-
-
-class _Surface:
-    """Points of the resting hand with their normals."""
-
-    def __init__(self, points: np.ndarray):
-        self.tree: cKDTree | None = None
-        if len(points) < FEWEST:
-            return
-        points = np.random.default_rng(0).permutation(points)[: 8 * POINTS]
-        _, index = cKDTree(points).query(points, k=NEIGHBOURS)
-        around = points[index] - points[index].mean(axis=1, keepdims=True)
-        spread, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))
-        flat = spread[:, 0] < FLAT * spread[:, 1]
-        self.points, self.normals = points[flat], axes[flat, :, 0]
-        if len(self.points) >= FEWEST:
-            self.tree = cKDTree(self.points)
-
-    def lay(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Displacement of points (P, 3), and the root of its information, (3,) and (3, 3).
-
-        None where too little of the surface is seen.
-        """
-        if self.tree is None:
-            return None
-        offset, sure = np.zeros(3), np.zeros((3, 3))
-        for most in NEAREST:
-            distance, index = self.tree.query(points - offset, distance_upper_bound=most)
-            near = np.isfinite(distance)
-            if near.sum() < FEWEST:
-                return None
-            normals = self.normals[index[near]]
-            across = points[near] - offset - self.points[index[near]]
-            sure = normals.T @ normals / len(normals)
-            gap = np.einsum("ij,ij->i", normals, across)
-            offset = offset + np.linalg.lstsq(sure, normals.T @ gap / len(gap), rcond=0.02)[0]
-        return offset, np.linalg.cholesky(sure + 1e-6 * np.eye(3)).T

@@ -56,7 +56,7 @@ def hold_of(done: Processed) -> Hold:
     force = np.array(facts.hold_force) - half
     size = float(np.linalg.norm(force))
     up, along, across = _axes(scene, hand)
-    angles = np.array([_angle(float(force @ way), size) for way in (up, across)])
+    angles = np.array([np.arcsin(np.clip(force @ way / size, -1, 1)) for way in (up, across)])
     # By how much the axes turn where the hand or the grip is elsewhere.
     spread = np.zeros(2)
     for axis in np.eye(3) * HAND_ERROR:
@@ -118,7 +118,3 @@ def _weight(done: Processed, zero: float) -> tuple[float | None, float]:
 def _unsure(change: list[float] | None, steady: bool) -> float:
     """How far the zero while held may be from that before [N]: it is somewhere up to the change."""
     return 0.0 if steady or change is None else float(np.linalg.norm(change))
-
-
-def _angle(part: float, size: float) -> float:
-    return float(np.arcsin(np.clip(part / size, -1, 1)))

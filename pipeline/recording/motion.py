@@ -23,6 +23,11 @@ DEGREE = 5  # of the splines that are differentiated twice
 KNOTS_APART, LEAST_BETWEEN, PHASES = 0.05, 2, 3  # s, in samples at least, and splines
 
 
+def interpolated(times: np.ndarray | float, t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (S, C) at t (S,) at other times, linear between and constant beyond, (..., C)."""
+    return np.stack([np.interp(times, t, column) for column in values.T], axis=-1)
+
+
 def expect_dense(stream: Stream[Any]) -> None:
     """Raises UserError where nearly all of a topic is missing: an even grid would not end."""
     span = (int(stream.stamp[-1]) - int(stream.stamp[0])) * 1e-9
@@ -59,8 +64,7 @@ class Motion:
 
     def position(self, times: np.ndarray | float) -> np.ndarray:
         """Shape (..., 3), linear between samples, at rest beyond them."""
-        axes = [np.interp(times, self.time, axis) for axis in self.path.T]
-        return np.stack(axes, axis=-1)
+        return interpolated(times, self.time, self.path)
 
     def orientation(self, times: np.ndarray | float) -> Rotation:
         """The hand's frame into frame O."""

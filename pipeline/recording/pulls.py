@@ -15,18 +15,11 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.params.lab import SetupParams
-from pipeline.recording.events import (
-    MARGIN,
-    SETTLE,
-    Opening,
-    Release,
-    find_grasp,
-    find_release,
-    find_releases,
-)
 from pipeline.recording.geometry import Geometry, geometry_of
+from pipeline.recording.grasp import MARGIN, Opening, find_grasp
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.motion import Motion, expect_dense
+from pipeline.recording.release import SETTLE, Release, find_release, find_releases
 from pipeline.recording.zero import NewZero, zeroed
 
 CALM = 3.0  # s after a release until the band hangs at rest again, to some 2 mm

@@ -16,10 +16,7 @@ AROUND = 0.4  # s before and after the release
 THERE = 0.01  # m: while the hand is further from where it lets go, it dips or draws
 HELD = 12  # pictures before that, of which it is learned how the drawn band is seen
 NEAR = 0.025  # m around the straight lines from the tips to the hand
-OUTER, HAND = (
-    0.78,
-    0.05,
-)  # share of them from which on, and m before the hand until which, is looked
+OUTER, HAND = 0.78, 0.05  # share of them from which on, m before the hand until which, is looked
 FEWEST = 30  # points of the drawn band
 SEEN = 0.5  # share of them from which a picture shows it drawn
 FADED = 0.15  # share of the drawn band: a sound picture shows less of it
@@ -115,16 +112,15 @@ def release_pictures(pull: Pull, fork_width: float) -> ReleasePictures | None:
     if not len(gone) or gone[0] == 0 or gone[0] == len(times) - 1:
         return None
     first = int(gone[0])
-    a, b = times[first - 1], times[first]
-    later = times[first:][share[first:] > SEEN]
+    drawn, empty = float(times[first - 1]), float(times[first])
     return ReleasePictures(
-        float(a - EMPTY_AFTER),
-        float(b),
-        float(a),
-        float(b),
-        tuple(map(float, later)),
-        tuple(repeated),
-        tuple(map(float, share[first : first + 4])),
+        earliest=drawn - EMPTY_AFTER,
+        latest=empty,
+        drawn=drawn,
+        gone=empty,
+        again=tuple(times[first:][share[first:] > SEEN].tolist()),
+        repeated=tuple(repeated),
+        faded=tuple(share[first : first + 4].tolist()),
     )
 
 
@@ -138,10 +134,8 @@ def _points(
     if (seen[:, 2] < NEAR).any():
         return 0
     margin = NEAR * camera.matrix[0, 0] / seen[:, 2].min()
-    pixels, size = camera.project(seen), np.array([camera.width, camera.height])
-    low = np.clip(pixels.min(axis=0) - margin, 0, size).astype(int)
-    high = np.clip(pixels.max(axis=0) + margin, 0, size).astype(int)
-    window = slice(low[1], high[1]), slice(low[0], high[0])
+    pixels = camera.project(seen)
+    window = camera.window(pixels.min(axis=0) - margin, pixels.max(axis=0) + margin)
     depth = depth[window]
     points = pose.apply((rays[window] * depth[..., None])[depth > 0].astype(float))
     chosen = np.zeros(len(points), bool)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.recording.events import MARGIN
+from pipeline.recording.grasp import MARGIN
 from pipeline.recording.pulls import Pull
 
 WINDOW = 0.05  # s in which noise is looked for

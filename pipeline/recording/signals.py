@@ -13,9 +13,9 @@ from pipeline.episode.window import Window, window_of
 from pipeline.params import Params
 from pipeline.params.lab import Tool
 from pipeline.params.recording import EpisodeParams
-from pipeline.recording.events import MARGIN
 from pipeline.recording.geometry import turned
-from pipeline.recording.motion import VELOCITY_WINDOW, Motion, expect_dense
+from pipeline.recording.grasp import MARGIN
+from pipeline.recording.motion import VELOCITY_WINDOW, Motion, expect_dense, interpolated
 from pipeline.recording.pulls import Pull
 from pipeline.recording.tare import band_force
 from pipeline.recording.tool_inertia import ToolInertia
@@ -54,7 +54,7 @@ class SignalFacts:
         rate: Of the force [Hz].
         longest_gap: In the window, by topic [s].
         cutoff_hz: Of the force's filter [Hz].
-        release_error, release_fall, release_resolution, release_spread: Of `events.Release` [s].
+        release_error, release_fall, release_resolution, release_spread: Of `Release` [s].
         filtered: A filter is between sensor and recording, by how the force falls.
         slips: Sudden drops of the held force before the release, since the window's start [s].
         jumps: Those of the free hand before the grasp, that are not in `zeroed` [s].
@@ -119,8 +119,7 @@ class Signals:
 
     def hand(self, times: np.ndarray | float) -> np.ndarray:
         """Tool centre point at any times, shape (..., 3)."""
-        axes = [np.interp(times, self.path_time, axis) for axis in self.path.T]
-        return np.stack(axes, axis=-1)
+        return interpolated(times, self.path_time, self.path)
 
     def opening_at(self, time: float) -> float:
         """Distance between the fingers [m], 0 where it was not recorded."""

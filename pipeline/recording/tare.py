@@ -9,9 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
 from pipeline.params.lab import Tool
-from pipeline.recording.events import LEAD_IN, MARGIN, SETTLE, Release
 from pipeline.recording.geometry import Geometry
+from pipeline.recording.grasp import LEAD_IN, MARGIN
 from pipeline.recording.motion import Motion
+from pipeline.recording.release import SETTLE, Release
 from pipeline.recording.zero import Drift, drift_of
 
 GRAVITY = np.array([0.0, 0.0, -9.81])  # m/s^2, frame O

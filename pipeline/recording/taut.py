@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pipeline.recording.motion import interpolated
 from pipeline.recording.view import Scene
 
 PULLED = 1.1  # least stretch: a band that is drawn less sags
@@ -69,7 +70,7 @@ def samples_of(
     scene: Scene, times: np.ndarray, clouds: list[np.ndarray], eye: np.ndarray, clamp: np.ndarray
 ) -> Samples | None:
     """Samples of what `tips.measure_tips` gets; None where too little of the drawn band is seen."""
-    signals, parts, stretches = scene.signals, [], []
+    signals, parts = scene.signals, []
     for time, cloud in zip(times, clouds, strict=True):
         if not (scene.taut(time) and scene.stretch(time) > PULLED and len(cloud)):
             continue
@@ -79,8 +80,7 @@ def samples_of(
         ways = hand - scene.tips
         lengths = np.linalg.norm(ways, axis=1)
         both = np.linalg.norm((ways / lengths[:, None]).sum(axis=0))
-        force = np.array([np.interp(time, signals.time, axis) for axis in signals.force.T])
-        tension = np.linalg.norm(force) / both
+        tension = np.linalg.norm(interpolated(time, signals.time, signals.force)) / both
         away = (cloud[:, None] - scene.tips).astype(float)  # (P, 2, 3)
         along = np.einsum("psi,si->ps", away, ways / lengths[:, None])
         aside = np.linalg.norm(away - along[..., None] * ways / lengths[:, None], axis=-1)
@@ -91,26 +91,24 @@ def samples_of(
         if tension <= 0 or min(np.sum(retained & (side == s)) for s in (0, 1)) < LEAST_POINTS:
             continue
         retained = np.flatnonzero(retained)[:: max(1, int(retained.sum()) // MOST_POINTS)]
-        radius = scene.diameter / 2 / np.sqrt(scene.stretch(time))  # rubber keeps its volume
-        parts.append(
-            (cloud[retained].astype(float), scene.tips[side[retained]], hand, tension, radius)
-        )
-        stretches.append(scene.stretch(time))
+        points, tips = cloud[retained].astype(float), scene.tips[side[retained]]
+        parts.append((points, tips, hand, tension, scene.stretch(time)))
     if len(parts) < LEAST_FRAMES:
         return None
     hanging, bulge = _hanging(scene, times, clouds, eye)
     if abs(clamp[1]) > IN_PLANE:
         hanging, bulge = hanging[:0], bulge[:0]  # the clamps bend it out of their plane
-    sizes = [len(part[0]) for part in parts]
-    hands = np.array([part[2] for part in parts])
+    points, tips, hands, tensions, stretches = zip(*parts, strict=True)
+    sizes, hands = list(map(len, points)), np.array(hands)
+    radii = scene.diameter / 2 / np.sqrt(stretches)  # rubber keeps its volume
     _, cells = np.unique(np.round(hands / CELL), axis=0, return_inverse=True)
     shares = 1 / np.bincount(cells)[cells] / np.array(sizes)
     return Samples(
-        points=np.concatenate([part[0] for part in parts]),
-        tip=np.concatenate([part[1] for part in parts]),
+        points=np.concatenate(points),
+        tip=np.concatenate(tips),
         hand=np.repeat(hands, sizes, axis=0),
-        tension=np.repeat([part[3] for part in parts], sizes),
-        radius=np.repeat([part[4] for part in parts], sizes),
+        tension=np.repeat(tensions, sizes),
+        radius=np.repeat(radii, sizes),
         weight=np.repeat(shares, sizes),
         cell=np.repeat(cells.ravel(), sizes),
         stretch=np.repeat(stretches, sizes),

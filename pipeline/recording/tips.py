@@ -152,22 +152,39 @@ def measure_tips(
     def seen_by(kind: str, factor: float) -> Tips:
         """What would be off if the camera saw by so much more."""
         sight = samples.points.mean(axis=0) - eye
-        points, hanging = (
-            _seen_by(kind, factor, sampled, eye, sight)
-            for sampled in (samples.points, samples.hanging)
-        )
+        points = _seen_by(kind, factor, samples.points, eye, sight)
+        hanging = _seen_by(kind, factor, samples.hanging, eye, sight)
         return _of_samples(scene, replace(samples, points=points, hanging=hanging), eye)
 
     return replace(tips, lens=_lens(tips, seen_by))
 
 
 def _of_samples(scene: Scene, samples: Samples, eye: np.ndarray) -> Tips:
+    """Fit the points' middle first, which is linear, and then their surface; without `lens`."""
     first = _fit(samples, taut.from_middle, PRIOR_MEAN, eye)[0]
     state, covariance, off = _fit(samples, taut.from_surface, first, eye)
     # The law of bending is no exact one, and shifts the line's beginning as a camera would.
     bend = 2 * state[taut.STIFFNESS] / np.sqrt(np.median(samples.tension)) * np.sqrt(0.5)
     spare = np.hypot(FLOOR, MODEL * bend * samples.clamp)
-    return _tips(scene, samples, state, covariance, spare, float(np.median(np.abs(off))))
+    correction = Transform(Rotation.from_rotvec(state[TURN]), state[SHIFT])
+    errors = []
+    for x, y, z in scene.tips:
+        turn = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])  # of the tip, by a rotation vector
+        slope = np.hstack([np.eye(3), turn])
+        variance = np.diag(slope @ covariance[:6, :6] @ slope.T)
+        errors.append(np.sqrt(variance + spare**2))
+    spread = np.sqrt(np.diag(covariance))
+    return Tips(
+        offsets=correction.inverse().apply(scene.tips) - scene.tips,
+        errors=np.array(errors),
+        correction=correction,
+        rotation_error=spread[TURN],
+        hand=state[HAND],
+        hand_error=np.hypot(spread[HAND], FLOOR),
+        residual=float(np.median(np.abs(off))),
+        frames=samples.frames,
+        reach=float(np.linalg.norm(samples.hand, axis=1).max()),
+    )
 
 
 def _seen_by(
@@ -237,32 +254,3 @@ def _scale(off: np.ndarray, most: float) -> float:
 
 def _huber(off: np.ndarray, scale: float) -> np.ndarray:
     return 1 / np.maximum(1, np.abs(off) / (SHARP * scale)) / scale**2
-
-
-def _tips(
-    scene: Scene,
-    samples: Samples,
-    state: np.ndarray,
-    covariance: np.ndarray,
-    spare: np.ndarray,
-    residual: float,
-) -> Tips:
-    correction = Transform(Rotation.from_rotvec(state[TURN]), state[SHIFT])
-    errors = []
-    for x, y, z in scene.tips:
-        turn = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])  # of the tip, by a rotation vector
-        slope = np.hstack([np.eye(3), turn])
-        variance = np.diag(slope @ covariance[:6, :6] @ slope.T)
-        errors.append(np.sqrt(variance + spare**2))
-    spread = np.sqrt(np.diag(covariance))
-    return Tips(
-        offsets=correction.inverse().apply(scene.tips) - scene.tips,
-        errors=np.array(errors),
-        correction=correction,
-        rotation_error=spread[TURN],
-        hand=state[HAND],
-        hand_error=np.hypot(spread[HAND], FLOOR),
-        residual=residual,
-        frames=samples.frames,
-        reach=float(np.linalg.norm(samples.hand, axis=1).max()),
-    )

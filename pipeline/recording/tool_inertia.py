@@ -14,10 +14,11 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from pipeline.params.lab import Tool
-from pipeline.recording.events import MARGIN, SETTLE
 from pipeline.recording.geometry import Geometry
-from pipeline.recording.motion import Motion
+from pipeline.recording.grasp import MARGIN
+from pipeline.recording.motion import Motion, interpolated
 from pipeline.recording.pulls import Pull
+from pipeline.recording.release import SETTLE
 from pipeline.recording.tare import load_per_mass
 
 LONGEST = 0.1  # s of either sign
@@ -85,8 +86,7 @@ def estimate_tool_inertia(pull: Pull, tool: Tool | None) -> ToolInertia | None:
     delay, mass, errors = 0.0, 0.0, np.full(2, np.inf)
     for _ in range(ROUNDS):  # Gauss-Newton
         at = t + delay  # stamps that are late say later what happens now
-        seen = np.stack([np.interp(at, grid, column) for column in table.T], axis=1)
-        seen = np.hstack([seen, force])
+        seen = np.hstack([interpolated(at, grid, table), force])
         for part in (late, ~late):  # each has a bias of its own
             seen[part] -= seen[part].mean(axis=0) if part.any() else 0.0
         columns, right = seen[:, :6].reshape(-1, 2, 3), seen[:, 6:]

@@ -269,7 +269,4 @@ class View:
         pixels = camera.project(seen[seen[:, 2] > 0.05])
         if not len(pixels):
             return slice(0, camera.height), slice(0, camera.width)
-        size = np.array([camera.width, camera.height])
-        low = np.clip(np.floor(pixels.min(axis=0)) - 5, 0, size).astype(int)
-        high = np.clip(np.ceil(pixels.max(axis=0)) + 6, 0, size).astype(int)
-        return slice(low[1], high[1]), slice(low[0], high[0])
+        return camera.window(np.floor(pixels.min(axis=0)) - 5, np.ceil(pixels.max(axis=0)) + 6)

@@ -10,7 +10,7 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.episode.phases import phases
 from pipeline.recording.build import episode_of, process_pulls
-from pipeline.recording.events import find_release, find_releases
+from pipeline.recording.release import find_release, find_releases
 from tests.project import with_
 from tests.recording.conftest import written
 from validation.recordings.bag import Truth

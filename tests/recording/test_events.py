@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.recording.events import find_grasp, find_release, find_releases
+from pipeline.recording.grasp import find_grasp
+from pipeline.recording.release import find_release, find_releases
 
 DIRECTION = np.array([0.3, -0.8, 0.52])
 

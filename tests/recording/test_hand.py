@@ -9,7 +9,8 @@ import pytest
 from mcap.records import Schema
 
 from pipeline.recording.geometry import geometry_of
-from pipeline.recording.input.container import Channel, read_container
+from pipeline.recording.input.container import read_container
+from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.reader import Recording, read_recording, recording_of
 from pipeline.recording.pulls import Pull
 from pipeline.recording.signals import signals_of

@@ -49,13 +49,13 @@ def findings(done: Processed) -> Iterator[Finding]:
     if tips is None:
         what = "too few pictures of the drawn band to tell how far the fork tips are off"
         cure = "pull slowly, and further; where the band is seen, check the camera's depth and pose"
-        yield Finding(EXTRINSICS.name, what, cure)
+        yield EXTRINSICS.found(what, cure)
         return
     yield from _of_pose(tips, done.pull.geometry)
     off, error = tips.hand_off, tips.hand_off_error
     if off > max(HAND_OFF, HAND_SURE * error):
         what = f"the band ends {1e3 * off:.1f} ± {1e3 * error:.1f} mm from the tool centre point"
-        yield Finding(HAND.name, what, HAND.remedy)
+        yield HAND.found(what)
 
 
 def _of_pose(tips: Tips, geometry: Geometry) -> Iterator[Finding]:
@@ -72,7 +72,7 @@ def _of_pose(tips: Tips, geometry: Geometry) -> Iterator[Finding]:
         what += f" and the band turned by {np.degrees(turn):.1f} degrees"
     lens = tips.lens
     if lens is None:
-        yield Finding(EXTRINSICS.name, what, f"calibrate it again, or {move}")
+        yield EXTRINSICS.found(what, f"calibrate it again, or {move}")
         return
     factor = f"{lens.factor:.3f} ± {lens.error:.3f}"
     if lens.kind == "depth":
@@ -81,7 +81,7 @@ def _of_pose(tips: Tips, geometry: Geometry) -> Iterator[Finding]:
     else:
         what += f", as one does that sees all {factor} times as wide as it is"
         cure = "calibrate its focal length (camera_info)"
-    yield Finding(LENS.name, what, f"{cure}; if that is right, {move}")
+    yield LENS.found(what, f"{cure}; if that is right, {move}")
 
 
 def camera_to_fork(tips: Tips, geometry: Geometry) -> list[float]:

@@ -30,9 +30,8 @@ def findings(done: Processed) -> Iterator[Finding]:
     recording = done.pull.recording
     for note in recording.notes:
         if "no checksums" in note:
-            yield Finding(CHECKSUMS.name, note, CHECKSUMS.remedy)
+            yield CHECKSUMS.found(note)
     if recording.losses:
         count = len(recording.losses)
         many = f"{count} things were lost or mended, first of all"
-        what = f"{many if count > 1 else 'lost or mended'}: {recording.losses[0]}"
-        yield Finding(LOSSES.name, what, LOSSES.remedy)
+        yield LOSSES.found(f"{many if count > 1 else 'lost or mended'}: {recording.losses[0]}")

@@ -25,6 +25,10 @@ class Check:
     refuses: str
     remedy: str
 
+    def found(self, what: str, cure: str | None = None, refused: bool = False) -> Finding:
+        """What it found; the cure is its remedy where no other one is given."""
+        return Finding(self.name, what, self.remedy if cure is None else cure, refused)
+
 
 @dataclass(frozen=True)
 class Finding:

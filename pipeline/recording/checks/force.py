@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.recording.checks.finding import Check, Finding
-from pipeline.recording.events import RUBBER
 from pipeline.recording.processed import Processed
+from pipeline.recording.release import RUBBER
 from pipeline.recording.sensor import QUIET, flat_top
 
 NOISE = DRIFT = 0.02  # of the held force; drift from grasp to release
@@ -109,23 +109,21 @@ def findings(done: Processed) -> Iterator[Finding]:
     share = facts.noise / hold
     if share > NOISE:
         what = f"the force's noise is {facts.noise:.2f} N, {100 * share:.0f} % of the hold"
-        yield Finding(NOISY.name, what, NOISY.remedy)
+        yield NOISY.found(what)
     pull = signals.release_time - signals.grasp_time
     drifted = float(np.linalg.norm(facts.drift)) * pull
     if drifted > DRIFT * hold:
-        what = f"the force drifts by {drifted:.2f} N from grasp to release"
-        yield Finding(DRIFTS.name, what, DRIFTS.remedy)
+        yield DRIFTS.found(f"the force drifts by {drifted:.2f} N from grasp to release")
     yield from _of_zero(done, hold)
     most = done.params.setup.max_force
     if facts.peak_force > most:
         what = f"the peak force of {facts.peak_force:.1f} N is above setup.max_force {most:g} N"
-        yield Finding(MOST_FORCE.name, what, MOST_FORCE.remedy)
+        yield MOST_FORCE.found(what)
     if facts.release_error > RELEASE:
-        what = f"the release is known to ± {1e3 * facts.release_error:.1f} ms"
-        yield Finding(RELEASED.name, what, RELEASED.remedy)
+        yield RELEASED.found(f"the release is known to ± {1e3 * facts.release_error:.1f} ms")
     for time in facts.slips:
         what = f"the force drops suddenly at {done.start + time:.2f} s, before the release"
-        yield Finding(SLIP.name, what, SLIP.remedy)
+        yield SLIP.found(what)
 
 
 def _of_sensor(done: Processed) -> Iterator[Finding]:
@@ -141,12 +139,12 @@ def _of_sensor(done: Processed) -> Iterator[Finding]:
         if top.frozen:
             what = f"the force does not change at all while it is large ({times}): the sensor froze"
             cure = "see why its driver stopped, and record again"
-        yield Finding(RANGE.name, what, cure, refused=True)
+        yield RANGE.found(what, cure, refused=True)
     if facts.filtered:
         what = f"the force takes {1e3 * facts.release_spread:.1f} ms to fall from 9 to 3 tenths:"
         what += " it is filtered, and comes about as late"
         refused = facts.release_spread > SLOW
-        yield Finding(FILTER.name, what, FILTER.remedy, refused)
+        yield FILTER.found(what, refused=refused)
 
 
 def _of_zero(done: Processed, hold: float) -> Iterator[Finding]:
@@ -155,15 +153,15 @@ def _of_zero(done: Processed, hold: float) -> Iterator[Finding]:
     if not facts.zero_steady and change > ZERO_OFF * hold:
         what = f"the force's zero is {change:.2f} N off after the release, and did not get there"
         what += f" steadily: the held force is unsure by up to {100 * change / hold:.0f} %"
-        yield Finding(ZERO.name, what, ZERO.remedy, change > ZERO_FAR * hold)
+        yield ZERO.found(what, refused=change > ZERO_FAR * hold)
     elif SURE * facts.zero_error > ZERO_UNSURE * hold:
         share = 100 * SURE * facts.zero_error / hold
         what = f"the free hand's force is known to {SURE * facts.zero_error:.2f} N only, which is"
         what += f" {share:.0f} % of the hold"
-        yield Finding(ZERO.name, what, ZERO.remedy, SURE * facts.zero_error > ZERO_FAR * hold)
+        yield ZERO.found(what, refused=SURE * facts.zero_error > ZERO_FAR * hold)
     for time in facts.zeroed:
         what = f"the sensor was zeroed at {done.start + time:.2f} s, which is taken out"
-        yield Finding(ZEROED.name, what, ZEROED.remedy)
+        yield ZEROED.found(what)
     for time in facts.jumps:
         what = f"the free hand's force jumps at {done.start + time:.2f} s, before the grasp"
-        yield Finding(JUMP.name, what, JUMP.remedy)
+        yield JUMP.found(what)

@@ -31,7 +31,7 @@ def findings(done: Processed) -> Iterator[Finding]:
     frame = recording.wrench.frame
     if frame not in recording.transforms.frames and not geometry.sensor_is_fixed:
         what = f"/tf_static does not know the force's frame {frame!r}, so it is taken as the hand's"
-        yield Finding(SENSOR.name, what, SENSOR.remedy)
+        yield SENSOR.found(what)
     if geometry.loop and not geometry.loop.closed:
         given = [
             f"setup.{name}"
@@ -39,4 +39,4 @@ def findings(done: Processed) -> Iterator[Finding]:
             if geometry.sources[name].startswith("setup")
         ]
         cure = f"{' or '.join(given)} contradicts /tf_static: {LOOP.remedy}"
-        yield Finding(LOOP.name, str(geometry.loop), cure)
+        yield LOOP.found(str(geometry.loop), cure)

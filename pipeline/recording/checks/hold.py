@@ -57,7 +57,7 @@ def findings(done: Processed) -> Iterator[Finding]:
             what = f"the band {ways[k][int(force < 0)]} the hand by {abs(force):.1f} N,"
             what += f" {np.degrees(angle):.1f} ± {np.degrees(error):.1f} degrees {directions[k]}"
             refused = angle > SURE * error + ASTRAY
-            yield Finding(DIRECTION.name, what, DIRECTION.remedy, refused)
+            yield DIRECTION.found(what, refused=refused)
 
 
 def _of_stiffness(hold: Hold) -> Iterator[Finding]:
@@ -74,7 +74,7 @@ def _of_stiffness(hold: Hold) -> Iterator[Finding]:
     if unit:
         what += f": the force seems to be in {unit}"
     refused = not NO_RUBBER[0] < hold.modulus < NO_RUBBER[1]
-    yield Finding(STIFFNESS.name, what, STIFFNESS.remedy, refused)
+    yield STIFFNESS.found(what, refused=refused)
 
 
 def _unit(modulus: float, weight: float | None) -> str:

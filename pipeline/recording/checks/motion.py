@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.recording.checks.finding import Check, Finding
-from pipeline.recording.events import SETTLE
 from pipeline.recording.processed import Processed
 from pipeline.recording.pulls import CALM
+from pipeline.recording.release import SETTLE
 from pipeline.recording.signals import Signals
 
 LEAD_IN, PAUSE = 0.5, 1.0  # s
@@ -56,22 +56,20 @@ def findings(done: Processed) -> Iterator[Finding]:
     signals = done.signals
     lead = done.start + signals.grasp_time
     if round(lead, 2) < LEAD_IN:
-        what = f"only {lead:.2f} s of the empty hand come before the grasp"
-        yield Finding(LEAD.name, what, LEAD.remedy)
+        yield LEAD.found(f"only {lead:.2f} s of the empty hand come before the grasp")
     still, change = pause(signals)
     if still < PAUSE or change > SETTLED:
         what = f"the hand rests for {still:.1f} s before the release"
         if change > SETTLED:
             what += f", and in its last half second the force changes by {100 * change:.1f} %"
-        yield Finding(PAUSES.name, what, PAUSES.remedy)
+        yield PAUSES.found(what)
     turn = float(np.degrees(signals.facts.turn))
     if turn > TURN and done.params.setup.tool is None:
-        what = f"the hand turns by {turn:.1f} degrees, and its weight with it"
-        yield Finding(TURNS.name, what, TURNS.remedy)
+        yield TURNS.found(f"the hand turns by {turn:.1f} degrees, and its weight with it")
     since = done.start - done.pull.force_time[0] + SETTLE
     if done.pull.number > 1 and since < CALM:
         what = f"the pictures begin {since:.1f} s after the pull before, the band may still swing"
-        yield Finding(REST.name, what, f"wait for {CALM - since:.1f} s longer between two pulls")
+        yield REST.found(what, f"wait for {CALM - since:.1f} s longer between two pulls")
 
 
 def pause(signals: Signals) -> tuple[float, float]:

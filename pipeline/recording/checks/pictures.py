@@ -78,7 +78,7 @@ def findings(done: Processed) -> Iterator[Finding]:
     if done.taut_coverage[0] is None:
         length = done.band.rest_length
         what = f"no picture shows the band drawn taut at a rest length of {length:g} m"
-        yield Finding(DRAWN.name, what, DRAWN.remedy, refused=True)
+        yield DRAWN.found(what, refused=True)
         return
     yield from of_coverage(done.coverage)
     colors, cannot = clouds.damaged_colors, "cannot be decoded"
@@ -89,7 +89,7 @@ def findings(done: Processed) -> Iterator[Finding]:
         (UNPAIRED, clouds.unpaired, f"{clouds.unpaired} depth pictures have no colour picture"),
     ):
         if count > EMPTY * frames:
-            yield Finding(check.name, what, check.remedy)
+            yield check.found(what)
 
 
 def of_coverage(rows: list[PictureLine]) -> Iterator[Finding]:
@@ -97,22 +97,18 @@ def of_coverage(rows: list[PictureLine]) -> Iterator[Finding]:
     phases = by_phase(rows)
     for row in phases:
         if row.coverage < COVERAGE.get(row.phase, 0.0):
-            yield Finding(
-                COVERED.name,
+            yield COVERED.found(
                 f"{100 * row.coverage:.0f} % of the band is covered while it"
-                f" {SEEN_AS[row.phase]} ({row.start:.2f} - {row.end:.2f} s)",
-                COVERED.remedy,
+                f" {SEEN_AS[row.phase]} ({row.start:.2f} - {row.end:.2f} s)"
             )
     shown = {row.phase for row in phases}
     for phase in (phase for phase in SEEN_AS if phase not in shown):
-        yield Finding(UNSEEN.name, f"no picture shows how the band {SEEN_AS[phase]}", UNSEEN.remedy)
+        yield UNSEEN.found(f"no picture shows how the band {SEEN_AS[phase]}")
     measured = [(row.time, row.off_plane) for row in rows if row.off_plane is not None]
     foreign = [time for time, off_plane in measured if off_plane > FOREIGN]
     if foreign:
         times = f"{foreign[0]:.2f} - {foreign[-1]:.2f} s"
-        yield Finding(
-            OFF_PLANE.name,
+        yield OFF_PLANE.found(
             f"{len(foreign)} of {len(measured)} pictures of the hanging band hold points off the"
-            f" plane that it hangs in ({times}): the hand, the arm or the background",
-            OFF_PLANE.remedy,
+            f" plane that it hangs in ({times}): the hand, the arm or the background"
         )

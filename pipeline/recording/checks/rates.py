@@ -73,28 +73,25 @@ def findings(done: Processed) -> Iterator[Finding]:
     for stream, roles in topics(done):
         most = min([GAPS[role] for role in roles if role in GAPS], default=np.inf)
         if stream.longest_gap > most:
-            what = f"{stream.topic} has a gap of {stream.longest_gap:.3f} s"
-            yield Finding(GAP.name, what, GAP.remedy)
+            yield GAP.found(f"{stream.topic} has a gap of {stream.longest_gap:.3f} s")
         elif stream.missing > MISSING * (len(stream.stamp) + stream.lost):
-            what = f"{stream.missing} messages of {stream.topic} are missing"
-            yield Finding(MISSED.name, what, MISSED.remedy)
+            yield MISSED.found(f"{stream.missing} messages of {stream.topic} are missing")
         rate = 1 / stream.period
         if stream.bursts:
             many, every = stream.bursts.count, stream.bursts.interval * 1e-6
             error = stream.bursts.error * 1e-6
             what = f"{stream.topic} is stamped in bursts of {many} every {every:.3g} ms"
             what += f", spread evenly to ± {error:.2g} ms"
-            yield Finding(BURSTS.name, what, BURSTS.remedy)
+            yield BURSTS.found(what)
         if stream.hold:
             what = f"{stream.topic} repeats each value for {1e3 * stream.hold:.3g} ms"
             what += f": it has {rate:.0f} new values a second"
-            yield Finding(HELD.name, what, HELD.remedy)
+            yield HELD.found(what)
         if "wrench" in roles and rate < FORCE_RATE:
             what = f"the force comes at {rate:.0f} Hz, so the release is known only that coarsely"
-            yield Finding(FORCE.name, what, FORCE.remedy)
+            yield FORCE.found(what)
         if "depth" in roles and rate < PICTURE_RATE:
-            what = f"pictures come at {rate:.0f} Hz, so few of them show the recoil"
-            yield Finding(PICTURES.name, what, PICTURES.remedy)
+            yield PICTURES.found(f"pictures come at {rate:.0f} Hz, so few of them show the recoil")
 
 
 def topics(done: Processed) -> list[tuple[Stream, list[str]]]:

@@ -28,8 +28,7 @@ CHECKS = (GRIPPER, SETS)
 
 def findings(done: Processed) -> Iterator[Finding]:
     if not done.pull.recording.gripper:
-        what = "the gripper was not recorded, so the grasp is read from the lift"
-        yield Finding(GRIPPER.name, what, GRIPPER.remedy)
+        yield GRIPPER.found("the gripper was not recorded, so the grasp is read from the lift")
     streams = done.pull.recording.streams
     for role, doubt in done.pull.recording.doubts.items():
-        yield Finding(SETS.name, f"{streams[role].topic} was taken, but {doubt}", SETS.remedy)
+        yield SETS.found(f"{streams[role].topic} was taken, but {doubt}")

@@ -6,10 +6,11 @@ from collections.abc import Iterator
 
 from pipeline.recording.checks.finding import Check, Finding
 from pipeline.recording.checks.rates import topics
-from pipeline.recording.input.clocks import DRIFTED, SURE
+from pipeline.recording.input.clocks import LIMITS
 from pipeline.recording.processed import Processed
 from pipeline.recording.release_pictures import EMPTY_AFTER, ReleasePictures
 
+SURE = LIMITS.sure  # standard errors
 DELAY = OPEN = 0.002  # s
 AHEAD = 0.01  # s of stamps before the force's, by the times of receipt
 BEHIND, SLOW = 0.02, {"color": 0.1, "depth": 0.1, "gripper": 0.1}  # s after; pictures take a while
@@ -75,7 +76,7 @@ DRIFT = Check(
     "clock_drift",
     "the growth of log_time less stamp with the force's, over the recording",
     "scatter of each second's least delay; messages that pile up all along look like a slow clock",
-    f"{1e3 * DRIFTED:g} ms over the recording, and {SURE:g} standard errors",
+    f"{1e3 * LIMITS.drifted:g} ms over the recording, and {SURE:g} standard errors",
     "",
     "stamp all topics by one clock (chrony or PTP between computers), and record again",
 )
@@ -88,19 +89,17 @@ def findings(done: Processed) -> Iterator[Finding]:
         most, offset = max(SLOW.get(role, BEHIND) for role in roles), force - stream.delay
         if not -most <= offset <= AHEAD:
             what = f"the stamps of {stream.topic} are {offset:+.3f} s off the force's, judged"
-            yield Finding(CLOCK.name, f"{what} by the times of receipt", CLOCK.remedy)
+            yield CLOCK.found(f"{what} by the times of receipt")
     yield from of_drift(done)
     yield from of_delays(done)
-    pose = done.delays.pose
-    if (pose.left or 0.0) > OPEN:
-        yield Finding(
-            UNKNOWN.name,
+    left = done.delays.pose.left or 0.0
+    if left > OPEN:
+        yield UNKNOWN.found(
             f"the pose's clock against the force's is not known better than"
-            f" ± {1e3 * (pose.left or 0.0):.1f} ms, and each ms is 0.4 % of the modulus",
-            UNKNOWN.remedy,
+            f" ± {1e3 * left:.1f} ms, and each ms is 0.4 % of the modulus"
         )
     if done.delays.conflict:
-        yield Finding(CONFLICT.name, done.delays.conflict, CONFLICT.remedy)
+        yield CONFLICT.found(done.delays.conflict)
     if done.delays.release is not None:
         yield from of_release(done.delays.release)
 
@@ -123,7 +122,7 @@ def of_delays(done: Processed) -> Iterator[Finding]:
         if delay.alone:
             what += "; only the hand that starts back shows it, as a robot's own motion would"
             cure = f"set episode.delays.{role} to what it is (0 where it is the robot's own motion)"
-        yield Finding(DELAYED.name, what, cure)
+        yield DELAYED.found(what, cure)
 
 
 def of_drift(done: Processed) -> Iterator[Finding]:
@@ -137,7 +136,7 @@ def of_drift(done: Processed) -> Iterator[Finding]:
                 f"the clock of {stream.topic} runs {rate} against the force's,"
                 f" {1e3 * drift.rate * drift.span:+.1f} ms over the recording, which is {taken}"
             )
-            yield Finding(DRIFT.name, what, DRIFT.remedy)
+            yield DRIFT.found(what)
 
 
 def of_release(seen: ReleasePictures) -> Iterator[Finding]:
@@ -145,25 +144,25 @@ def of_release(seen: ReleasePictures) -> Iterator[Finding]:
     if seen.frozen:
         first, count = seen.frozen[0], len(seen.frozen)
         what = f"{count} pictures from {1e3 * first:+.0f} ms of the release on are old ones again"
-        yield Finding(FROZEN.name, what, FROZEN.remedy, refused=True)
+        yield FROZEN.found(what, refused=True)
     elif seen.never:
         what = f"pictures show the band drawn until {seen.drawn:.2f} s after the force falls"
         cure = "set episode.delays.camera, or record again with one clock"
-        yield Finding(RELEASED.name, what, cure, refused=True)
+        yield RELEASED.found(what, cure, refused=True)
     elif seen.again:
         what = (
             f"the band is drawn once more {1e3 * seen.again[0]:.0f} ms after the release, when it"
             f" was gone at {1e3 * seen.gone:.0f} ms"
         )
-        yield Finding(RELEASED.name, what, "record again: pictures are old or in disorder")
+        yield RELEASED.found(what, "record again: pictures are old or in disorder")
     elif seen.beyond > 0:
         what = (
             f"a picture of {1e3 * seen.drawn:+.0f} ms after the force falls shows the band drawn,"
             f" that of {1e3 * seen.gone:+.0f} ms shows it let go, so the camera's stamps are"
             f" {1e3 * seen.earliest:+.0f} to {1e3 * seen.latest:+.0f} ms late"
         )
-        yield Finding(RELEASED.name, what, RELEASED.remedy)
+        yield RELEASED.found(what)
     if seen.smeared:
         share = 100 * max(seen.faded[1:3])
         what = f"{share:.0f} % of the drawn band is still seen a picture after it was let go"
-        yield Finding(SMEARED.name, what, SMEARED.remedy)
+        yield SMEARED.found(what)

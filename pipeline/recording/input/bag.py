@@ -41,7 +41,7 @@ def parts_of(path: Path) -> list[Path]:
         if path.is_dir():
             return _in_folder(path)
         _expect_file(path)
-        numbered = NUMBERED.fullmatch(_stem(path))
+        numbered = _numbered(path)
         return (numbered and _beside(path, numbered[1])) or [path]
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror})") from error
@@ -51,12 +51,7 @@ def metadata_of(path: Path) -> list[Path]:
     """The file that lists a bag's parts, where there is one."""
     parts = parts_of(path)
     file = parts[0].with_name(METADATA)
-    listed = (
-        [_there(parts[0].with_name(name)) for name in _listed(file.parent)]
-        if file.is_file()
-        else []
-    )
-    return [file] if parts[0] in listed else []
+    return [file] if file.is_file() and parts[0] in _listed_files(file.parent) else []
 
 
 def missing_parts(path: Path) -> list[str]:
@@ -90,7 +85,7 @@ def name_of(path: Path) -> str:
     path = Path(path)
     if path.is_dir():
         return path.resolve().name.removesuffix(SUFFIX)
-    numbered = NUMBERED.fullmatch(_stem(path))
+    numbered = _numbered(path)
     return numbered[1] if numbered and len(parts_of(path)) > 1 else _stem(path)
 
 
@@ -100,9 +95,9 @@ def sha256(path: Path) -> str:
     for part in parts_of(path):
         with part.open("rb") as file:
             digests.append(hashlib.file_digest(file, "sha256").hexdigest())
-    return (
-        digests[0] if len(digests) == 1 else hashlib.sha256("\n".join(digests).encode()).hexdigest()
-    )
+    if len(digests) == 1:
+        return digests[0]
+    return hashlib.sha256("\n".join(digests).encode()).hexdigest()
 
 
 def _expect_file(path: Path) -> None:
@@ -117,7 +112,7 @@ def _expect_file(path: Path) -> None:
 def _in_folder(folder: Path) -> list[Path]:
     files = [file for file in _files(folder) if file.stat().st_size]
     if (folder / METADATA).is_file():
-        listed = [_there(folder / name) for name in _listed(folder)]
+        listed = _listed_files(folder)
         parts = [file for file in listed if file in files]
         if not parts:
             names = ", ".join(file.name for file in listed[:NAMED]) or "no file"
@@ -132,7 +127,7 @@ def _in_folder(folder: Path) -> list[Path]:
         )
     if len(files) == 1:
         return files
-    stems = {numbered[1] for file in files if (numbered := NUMBERED.fullmatch(_stem(file)))}
+    stems = {numbered[1] for file in files if (numbered := _numbered(file))}
     parts = sorted(files, key=_number)
     if len(stems) == 1 and min(map(_number, files)) >= 0 and _follow(parts):
         return parts
@@ -142,17 +137,12 @@ def _in_folder(folder: Path) -> list[Path]:
 
 def _beside(path: Path, stem: str) -> list[Path] | None:
     """All parts of the split bag that this file is of; None where it is of none."""
-    parts = [
-        file
-        for file in _files(path.parent)
-        if (numbered := NUMBERED.fullmatch(_stem(file))) and numbered[1] == stem
-    ]
+    folder = path.parent
+    parts = [file for file in _files(folder) if (m := _numbered(file)) and m[1] == stem]
     if len(parts) < 2:
         return None
-    if (path.parent / METADATA).is_file() and path in [
-        _there(path.with_name(name)) for name in _listed(path.parent)
-    ]:
-        return _in_folder(path.parent)
+    if (folder / METADATA).is_file() and path in _listed_files(folder):
+        return _in_folder(folder)
     parts.sort(key=_number)
     return parts if _number(parts[0]) == 0 and _follow(parts) else None
 
@@ -175,8 +165,13 @@ def _there(file: Path) -> Path:
     return plain if plain.is_file() else file
 
 
+def _numbered(file: Path) -> re.Match[str] | None:
+    """The bag's name and the part's number, of a file that is named like a part."""
+    return NUMBERED.fullmatch(_stem(file))
+
+
 def _number(file: Path) -> int:
-    numbered = NUMBERED.fullmatch(_stem(file))
+    numbered = _numbered(file)
     return int(numbered[2]) if numbered else -1
 
 
@@ -193,6 +188,11 @@ def _listed(folder: Path) -> list[str]:
             " number: remove it, or `ros2 bag reindex` the bag"
         ) from error
     return sorted(dict.fromkeys(listed), key=lambda name: _number(Path(name)))
+
+
+def _listed_files(folder: Path) -> list[Path]:
+    """The files that a bag's metadata lists, there or not. Raises UserError."""
+    return [_there(folder / name) for name in _listed(folder)]
 
 
 def _follow(parts: list[Path]) -> bool:

@@ -62,6 +62,12 @@ class Camera:
         pixels, _ = model.projectPoints(points, still, still, self.matrix, self.distortion)
         return pixels.reshape(-1, 2)
 
+    def window(self, low: np.ndarray, high: np.ndarray) -> tuple[slice, slice]:
+        """Rows and columns of the picture between two pixels (u, v)."""
+        size = np.array([self.width, self.height])
+        first, last = (np.clip(pixel, 0, size).astype(int) for pixel in (low, high))
+        return slice(first[1], last[1]), slice(first[0], last[0])
+
 
 @dataclass(frozen=True)
 class Calibration:

@@ -34,21 +34,29 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
-LEAST = 0.010  # s: smaller steps cannot be distinguished from delays
-WINDOW = 1.0  # s of log_time around a break in which the least delay is looked for
-LEAST_AROUND = 3  # messages on each side of a step
-EVEN = 0.2  # of the period, by which intervals of an even rate differ in the median
-PILED = 0.2  # of the period, within which messages come that had to wait
-AGREE = 0.003  # s between a step by continuity and by log_time
-FAR = 1.0  # s between a stamp and those around it
-ALONE = 60.0  # s between one or two messages at a topic's end and the rest of it
-DISORDER = 10  # messages that go back, from which no clock was set, but the file has no order
-INTERLEAVED = 6  # how often stamps of two runs alternate that cover the same time
-LEAST_SECONDS = 5  # of least delays for a clock's drift
-SURE = 3.0  # standard errors from which a clock drifts
-DRIFTED = 0.003  # s over the recording from which it matters
-KNOWN = 0.001  # s over the recording, to which a rate must be known to be taken out
-TOLERANCE = 0.5  # s between the clocks of two topics
+
+@dataclass(frozen=True)
+class ClockLimits:
+    """Thresholds of clocks, each with its unit and what it is for."""
+
+    step: float = 0.010  # s: a smaller step looks like a delay of receipt
+    window: float = 1.0  # s of log_time on each side of a break, of which the least delay counts
+    around: int = 3  # messages at least in that window
+    even: float = 0.2  # of the period: intervals of an even rate differ by less, in the median
+    piled: float = 0.2  # of the period: messages that had to wait come within it
+    agree: float = 0.003  # s between a step by continuity and the same by log_time
+    far: float = 1.0  # s from a stamp to those around it: it is damage
+    alone: float = 60.0  # s from one or two messages at a topic's end to the rest: so are they
+    disorder: int = 10  # messages that go back: nobody set a clock so often, the file has no order
+    interleaved: int = 6  # times that two runs of messages alternate which cover the same time
+    seconds: int = 5  # of least delays: a line through fewer tells no drift
+    sure: float = 3.0  # standard errors from which a clock drifts
+    drifted: float = 0.003  # s over the recording from which its drift matters
+    known: float = 0.001  # s over the recording to which a rate must be known to be taken out
+    tolerance: float = 0.5  # s between the clocks of two topics: transport and drivers take less
+
+
+LIMITS = ClockLimits()
 
 
 @dataclass(frozen=True)
@@ -75,13 +83,13 @@ class ClockRate:
     @property
     def matters(self) -> bool:
         """Whether it is sure, and more than nothing over the recording."""
-        least = max(DRIFTED, SURE * self.error * self.span)
+        least = max(LIMITS.drifted, LIMITS.sure * self.error * self.span)
         return bool(np.isfinite(self.error)) and abs(self.rate) * self.span > least
 
     @property
     def taken_out(self) -> bool:
         """Whether it is known well enough to be better taken out."""
-        return self.matters and self.error * self.span < KNOWN
+        return self.matters and self.error * self.span < LIMITS.known
 
     def without(self, stamp: np.ndarray) -> np.ndarray:
         """Stamps [ns] at the other clock's rate, as they were at the first one."""
@@ -111,22 +119,24 @@ class Jump:
 def outliers(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
     """Which stamps [ns], in the order of arrival, are far from all around them; shape (S,).
 
-    At the ends of a topic these are also one or two that log_time has elsewhere, or that come a
-    minute before or after all others: too few to tell of a clock.
+    By a running median of five, as Hampel's filter, with a fixed limit. At the ends of a topic
+    these are also one or two that log_time has elsewhere, or that come a minute before or after all
+    others: too few to tell of a clock.
     """
     if len(stamp) < 5:
         return np.zeros(len(stamp), bool)
     middle = np.median(stamp.astype(float))
     usual = median_filter(stamp - middle, 5, mode="nearest") + middle
-    limit = max(FAR * 1e9, 10 * _period(stamp))
+    limit = max(LIMITS.far * 1e9, 10 * _period(stamp))
     far_off = np.abs(stamp - usual) > limit
     for order in (1, -1):
         retained = np.flatnonzero(~far_off)[::order]
         ways, by_log = np.abs(np.diff(stamp[retained])), np.abs(np.diff(log[retained]))
-        far = ways > np.where(np.abs(ways - by_log) > limit / 2, limit, max(ALONE * 1e9, limit))
+        elsewhere = np.abs(ways - by_log) > limit / 2
+        far = ways > np.where(elsewhere, limit, max(LIMITS.alone * 1e9, limit))
         begin = 0
-        for i in np.flatnonzero(far[: 2 * LEAST_AROUND]):
-            if i + 1 - begin >= LEAST_AROUND or 2 * i > len(retained):
+        for i in np.flatnonzero(far[: 2 * LIMITS.around]):
+            if i + 1 - begin >= LIMITS.around or 2 * i > len(retained):
                 break
             begin = i + 1
         far_off[retained[:begin]] = True
@@ -144,34 +154,35 @@ def arrival(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
 
 
 def steps(stamp: np.ndarray, log: np.ndarray) -> list[Jump]:
-    """Steps of the stamps' clock alone, in a topic [ns], in the order of arrival."""
-    if len(stamp) < 2 * LEAST_AROUND:
+    """Steps of the stamps' clock alone, in a topic [ns], in the order of arrival.
+
+    By a minimum filter of delays, as NTP's: the least delay before a break against that after it.
+    """
+    if len(stamp) < 2 * LIMITS.around:
         return []
     period, spread = _period(stamp), _spread(stamp)
-    exact = spread < EVEN * period
+    exact = spread < LIMITS.even * period
     arrived = np.maximum.accumulate(log)
-    least = max(LEAST * 1e9, 0.6 * period, 6 * spread)
+    least = max(LIMITS.step * 1e9, 0.6 * period, 6 * spread)
     delay = log - stamp
     # Messages that had piled up come all at once; their delays say nothing of a clock.
-    alone = np.diff(log, prepend=log[0] - period) > PILED * period
+    alone = np.diff(log, prepend=log[0] - period) > LIMITS.piled * period
     jumps: list[Jump] = []
     for i in np.flatnonzero(np.abs(np.diff(delay)) > least) + 1:
-        low = max(
-            np.searchsorted(arrived, arrived[i] - WINDOW * 1e9), jumps[-1].index if jumps else 0
-        )
-        high = np.searchsorted(arrived, arrived[i] + WINDOW * 1e9, side="right")
+        last = jumps[-1].index if jumps else 0
+        low = max(np.searchsorted(arrived, arrived[i] - LIMITS.window * 1e9), last)
+        high = np.searchsorted(arrived, arrived[i] + LIMITS.window * 1e9, side="right")
         before, after = (delay[a:b][alone[a:b]] for a, b in ((low, i), (i, high)))
-        if min(len(before), len(after)) < LEAST_AROUND:
+        if min(len(before), len(after)) < LIMITS.around:
             continue
         size = int(before.min() - after.min())
         way = int(stamp[i] - stamp[i - 1])
         leap = way - max(1, round((way - size) / period)) * period
         if min(abs(size), abs(way - period), abs(leap)) < least or (size > 0) != (way > period):
-            continue  # delays, a gap, or log_time's own step
-        agrees = abs(leap - size) < max(AGREE * 1e9, period / 4)
-        jumps.append(
-            Jump(int(i), int(log[i]), round(leap if agrees else size), period, exact and agrees)
-        )
+            continue  # delays, log_time's own step, or a gap
+        agrees = abs(leap - size) < max(LIMITS.agree * 1e9, period / 4)
+        leapt = round(leap if agrees else size)
+        jumps.append(Jump(int(i), int(log[i]), leapt, period, exact and agrees))
     return jumps
 
 
@@ -182,15 +193,15 @@ def rewinds(stamp: np.ndarray, log: np.ndarray) -> list[Jump]:
     as often as a file without any order goes back.
     """
     jumps, back = [], _back(stamp, log)
-    for i in back if len(back) < DISORDER else ():
+    for i in back if len(back) < LIMITS.disorder else ():
         before = stamp[:i][stamp[:i] >= stamp[i]]
         after = stamp[i:][stamp[i:] <= stamp[i - 1]]
         run = np.repeat([0, 1], [len(before), len(after)])
         order = np.argsort(np.concatenate([before, after]), kind="stable")
-        if np.count_nonzero(np.diff(run[order])) >= INTERLEAVED:
+        if np.count_nonzero(np.diff(run[order])) >= LIMITS.interleaved:
             period = _period(stamp)
             size = int(stamp[i] - stamp[i - 1]) - period
-            exact = _spread(stamp) < EVEN * period
+            exact = _spread(stamp) < LIMITS.even * period
             jumps.append(Jump(int(i), int(log[i]), size, period, exact))
     return jumps
 
@@ -222,10 +233,11 @@ def offset(
 def drift(stamp: np.ndarray, log: np.ndarray) -> tuple[float, float]:
     """Growth of the least delays [s/s], and its standard error; not known in a few seconds.
 
-    Receipt is on the recorder's clock: only the difference of two topics says something.
+    A line by least squares through each second's least delay. Receipt is on the recorder's clock:
+    only the difference of two topics says something.
     """
     least = _least(stamp, log, int(log.min()))
-    if len(least) < LEAST_SECONDS:
+    if len(least) < LIMITS.seconds:
         return 0.0, np.inf
     time, delay = np.array(list(least), float), np.array(list(least.values())) * 1e-9
     slope, start = np.polyfit(time, delay, 1)
@@ -245,7 +257,7 @@ def of_one_clock(drifts: list[tuple[float, float]]) -> tuple[float, float]:
 def _back(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
     """Messages at which both times go back, by about as much."""
     way, way_by_log = np.diff(stamp), np.diff(log)
-    both = np.maximum(way, way_by_log) < -LEAST * 1e9
+    both = np.maximum(way, way_by_log) < -LIMITS.step * 1e9
     return np.flatnonzero(both & (np.abs(way - way_by_log) < -way_by_log / 2)) + 1
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from functools import cached_property
+from os.path import commonprefix
 
 from pipeline.recording.input import sets
-from pipeline.recording.input.roles import COMMANDS, Candidate, Choice
+from pipeline.recording.input.roles import Candidate, Choice
 
 DEVICE = ("wrench", "pose", "twist", "gripper")  # of one arm
 LEAST_FOLLOWS = 0.1  # share of the force's steps below which they show no hand
@@ -32,29 +33,22 @@ class Company:
         """The candidate, and in words what speaks against it; None where nothing fits `chosen`."""
         if role not in DEVICE:
             return self._camera(role, candidates, chosen)
-        together = [candidate for candidate in candidates if not self._apart(candidate, chosen)]
-        if candidates and not together:
-            stranger, (other, of) = (
-                candidates[0],
-                next(iter(self._strangers(candidates[0], chosen))),
-            )
-            return None, f"{stranger.topic} is of another device than the {other}'s topic {of}"
-        if not together:
+        if not candidates:
             return None, ""
-        live = together
-        if len(together) > 1:
-            live = [candidate for candidate in together if self._alive(candidate)] or together
-        meant = [
-            candidate for candidate in live if not set(candidate.doubts) & set(COMMANDS)
-        ] or live
+        meant = [topic for topic in candidates if not any(self._strangers(topic, chosen))]
+        if not meant:
+            other, of = next(self._strangers(candidates[0], chosen))
+            what = f"{candidates[0].topic} is of another device than the {other}'s topic {of}"
+            return None, what
+        if len(meant) > 1:
+            meant = _some(self._alive, meant)
+        meant = _some(lambda topic: not topic.commanded, meant)
         if role == "wrench" and len(meant) > 1:
-            meant = [candidate for candidate in meant if self._falls(candidate)] or meant
+            meant = _some(self._falls, meant)
         elif role == "pose" and len(meant) > 1:
             meant = self._followed(meant, chosen["wrench"])
         elif role == "gripper" and len(meant) > 1:
-            meant = [
-                candidate for candidate in meant if self._opens(candidate, chosen["wrench"])
-            ] or meant
+            meant = _some(lambda topic: self._opens(topic, chosen["wrench"]), meant)
         best = max(meant, key=Candidate.merit)
         return best, self._tie(best, chosen) if role == "pose" else ""
 
@@ -80,9 +74,6 @@ class Company:
             for candidate in self.fitting(role)[:MOST_TOPICS]
         ]
         return sets.sides_of(dict.fromkeys(topics))
-
-    def _apart(self, candidate: Candidate, chosen: dict[str, Choice]) -> bool:
-        return any(True for _ in self._strangers(candidate, chosen))
 
     def _strangers(
         self, candidate: Candidate, chosen: dict[str, Choice]
@@ -115,22 +106,16 @@ class Company:
         force = self._course(wrench)
         if force is None:
             return hands
-        shares = []
+        shares = {}  # of hands whose poses were recorded: others are not compared
         for hand in hands:
-            course = (
-                None
-                if hand.choice.convert
-                else sets.course_of(hand.choice.channel, hand.choice.read)
-            )
-            shares.append(sets.follows(force, course) if course else None)
-        most = max([share for share in shares if share is not None], default=0.0)
+            choice = hand.choice
+            course = None if choice.convert else sets.course_of(choice.channel, choice.read)
+            if course:
+                shares[id(hand)] = sets.follows(force, course)
+        most = max(shares.values(), default=0.0)
         if most < LEAST_FOLLOWS:
             return hands
-        return [
-            candidate
-            for candidate, share in zip(hands, shares, strict=True)
-            if share is None or share >= sets.FOLLOWS * most
-        ]
+        return [hand for hand in hands if shares.get(id(hand), most) >= sets.FOLLOWS * most]
 
     def _opens(self, candidate: Candidate, wrench: Choice) -> bool:
         """Whether its fingers move when the force falls."""
@@ -145,15 +130,14 @@ class Company:
         wrench = chosen["wrench"]
         mine = (wrench.channel.topic, pose.topic, pose.typical.frame, wrench.typical().frame)
         for force in self.fitting("wrench"):
-            if not sets.apart((force.topic, force.typical.frame), mine, self.sides):
-                continue
-            if set(force.doubts) & set(COMMANDS) or not self._falls(force):
+            its = force.topic, force.typical.frame
+            if not sets.apart(its, mine, self.sides) or force.commanded or not self._falls(force):
                 continue
             for hand in self.fitting("pose"):
                 names = hand.topic, hand.typical.frame
                 if not sets.apart(names, mine, self.sides) or not self._alive(hand):
                     continue
-                if not sets.apart(names, (force.topic, force.typical.frame), self.sides):
+                if not sets.apart(names, its, self.sides):
                     return f"{force.topic} with {hand.topic} shows a release too"
         return ""
 
@@ -164,8 +148,8 @@ class Company:
     ) -> tuple[Candidate | None, str]:
         if len(candidates) < 2:
             return (candidates[0] if candidates else None), ""
-        live = [candidate for candidate in candidates if self._alive(candidate)] or candidates
-        placed = [candidate for candidate in live if candidate.typical.frame in self.frames] or live
+        live = _some(self._alive, candidates)
+        placed = _some(lambda topic: topic.typical.frame in self.frames, live)
         if role == "depth":
             color = chosen["color"]
             topic, frame = color.channel.topic, color.typical().frame
@@ -173,7 +157,7 @@ class Company:
             most = max(near.values())
             return max((o for o in placed if near[id(o)] == most), key=Candidate.merit), ""
         depths = self.fitting("depth")
-        paired = [candidate for candidate in placed if self._partner(candidate, depths)]
+        paired = [topic for topic in placed if self._partner(topic, depths)]
         best = max(paired or placed, key=Candidate.merit)
         return best, self._other_camera(best, paired, depths)
 
@@ -191,12 +175,16 @@ class Company:
             if len(color.doubts) > len(best.doubts) or color.topic == best.topic:
                 continue
             for depth in depths:
-                transform = self._near(depth, color.topic, color.typical.frame)
-                if transform > self._near(depth, best.topic, best.typical.frame) and self._alive(
-                    depth
-                ):
+                near = self._near(depth, color.topic, color.typical.frame)
+                nearer = near > self._near(depth, best.topic, best.typical.frame)
+                if nearer and self._alive(depth):
                     return f"{color.topic} with {depth.topic} is a camera too"
         return ""
+
+
+def _some(suits: Callable[[Candidate], bool], candidates: list[Candidate]) -> list[Candidate]:
+    """The candidates that suit, or all where none does."""
+    return [candidate for candidate in candidates if suits(candidate)] or candidates
 
 
 def _folders(topic: str) -> list[str]:
@@ -205,9 +193,4 @@ def _folders(topic: str) -> list[str]:
 
 def _shared(topic: str, other: str) -> int:
     """How many folders two topics have in common from the first on."""
-    count = 0
-    for a, b in zip(_folders(topic), _folders(other), strict=False):
-        if a != b:
-            break
-        count += 1
-    return count
+    return len(commonprefix([_folders(topic), _folders(other)]))

@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 
 from pipeline.base.errors import UserError
 from pipeline.recording.input import standard
-from pipeline.recording.input.container import Channel
+from pipeline.recording.input.contents import Channel
 
 Message = Any  # it has the attributes that its schema says, and whoever reads it finds out
 Decoder = Callable[[bytes], Message]

@@ -146,7 +146,11 @@ def crc(file: BinaryIO, start: int, end: int) -> int:
 
 
 def _decompressed(compression: str, packed: bytes, size: int) -> bytes:
-    """Unpack at most one byte more than `size`, whatever the compressed frame says of itself."""
+    """Unpack zstd or lz4 to at most one byte more than `size`, whatever its frame says of itself.
+
+    What is not compressed is returned as it is, of any length. Raises ValueError where the
+    compression is not known, or lz4's end is missing; and what the libraries raise.
+    """
     if compression == "zstd":
         stream = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
         return stream.read(size) + stream.read(1)

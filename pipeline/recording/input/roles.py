@@ -15,7 +15,7 @@ from pipeline.base.errors import UserError
 from pipeline.params.lab import SetupParams
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import read_calibration
-from pipeline.recording.input.container import Channel
+from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.decode import (
     Decoder,
     Message,
@@ -189,13 +189,18 @@ class Candidate:
         return [doubt for doubt in self.role.doubts if doubt in self._words]
 
     @property
+    def commanded(self) -> bool:
+        """Whether it says what the robot shall do, by its name, and not what was measured."""
+        return bool(set(self.doubts) & set(COMMANDS))
+
+    @property
     def _words(self) -> list[str]:
         return re.findall("[a-z]+", self.topic.lower())  # infra1 is infra
 
     def merit(self) -> tuple:
         """Measured, not spare, no doubts, a likely rate, kind, hints, messages; the alphabet."""
         return (
-            not set(self.doubts) & set(COMMANDS),
+            not self.commanded,
             self.kind not in self.role.spare,
             -len(self.doubts),
             self.rate >= self.role.rate,

@@ -15,7 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
-from pipeline.recording.input.container import Channel
+from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.decode import Unreadable
 from pipeline.recording.input.readings import Picture, Reading
 
@@ -130,12 +130,9 @@ def follows(force: Track, hand: Track) -> float:
 
 def moves_at(fingers: Track, fall: float) -> bool:
     """Whether fingers (N, C) move within half a second of `fall` [s], by when they were logged."""
-    since = fingers.time - fall
-    held, after = (since > -1.0) & (since < 0), (since > 0) & (since < AT_FALL)
-    if not held.any() or not after.any():
-        return False
-    away = np.abs(fingers.values[after] - np.median(fingers.values[held], axis=0)).max(axis=0)
-    return bool((away > np.maximum(0.2 * np.ptp(fingers.values, axis=0), 1e-9)).any())
+    away = _moved(fingers.values, fingers.time - fall)
+    least = np.maximum(0.2 * np.ptp(fingers.values, axis=0), 1e-9)
+    return away is not None and bool((away > least).any())
 
 
 def opening_of(
@@ -154,17 +151,21 @@ def opening_of(
         return values.sum(axis=1, keepdims=True)
     moved = np.ptp(values, axis=0)
     when = fall()
-    if when is not None:
-        since = (moments - when) * 1e-9
-        held, after = (since > -1.0) & (since < 0), (since > 0) & (since < AT_FALL)
-        if held.any() and after.any():
-            away = values[after] - np.median(values[held], axis=0)
-            at_fall = np.abs(away).max(axis=0)
-            moved = at_fall if (at_fall > MOVES * moved).any() else moved
+    at_fall = None if when is None else _moved(values, (moments - when) * 1e-9)
+    if at_fall is not None and (at_fall > MOVES * moved).any():
+        moved = at_fall
     largest = int(np.argmax(moved))
     middle = values - values.mean(axis=0)
     sign = np.where(middle.T @ middle[:, largest] < 0, -1.0, 1.0)
     return (values * sign)[:, moved >= MOVES * moved[largest]].sum(axis=1, keepdims=True)
+
+
+def _moved(values: np.ndarray, since: np.ndarray) -> np.ndarray | None:
+    """How far fingers (S, C) move from where they held, (C,), by times since the fall (S,) [s]."""
+    held, after = (since > -1.0) & (since < 0), (since > 0) & (since < AT_FALL)
+    if not held.any() or not after.any():
+        return None
+    return np.abs(values[after] - np.median(values[held], axis=0)).max(axis=0)
 
 
 def _alike(values: np.ndarray) -> bool:

@@ -89,7 +89,11 @@ def _same(payload: bytes, name: str) -> bool:
 
 
 def plain(payload: bytes, most: int) -> bytes:
-    """Return CDR of at most so many bytes. Raises ValueError where it is XCDR2 or too long."""
+    """Return a message's CDR, unpacked where zstd packed it.
+
+    Raises ValueError where it is XCDR2, or unpacks to more than `most` bytes. The length of what
+    is not packed is not checked.
+    """
     if payload[:4] == ZSTD:  # ros2 bag record --compression-mode message
         with zstandard.ZstdDecompressor().stream_reader(payload) as stream:
             payload = stream.read(most + 1)

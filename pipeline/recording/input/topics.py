@@ -14,7 +14,8 @@ from pipeline.recording.input import images
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import Camera, camera_from
 from pipeline.recording.input.company import Company
-from pipeline.recording.input.container import Channel, Container
+from pipeline.recording.input.container import Container
+from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.decode import Unreadable, decoder, message_reader
 from pipeline.recording.input.roles import (
     OPTIONAL,
@@ -97,12 +98,8 @@ class _Chooser:
         """Candidates that could play the role by what they are, looked for once."""
         if role not in self.fitting:
             self.problems = []
-            candidates = [self._candidate(role, channel) for channel in self.container.channels]
-            suiting = [
-                candidate
-                for candidate in candidates
-                if candidate is not None and self._suits(role, candidate)
-            ]
+            fitting = [self._candidate(role, channel) for channel in self.container.channels]
+            suiting = [topic for topic in fitting if topic is not None and self._suits(role, topic)]
             self.fitting[role] = suiting, self.problems
         candidates, problems = self.fitting[role]
         self.problems = [*problems]
@@ -189,22 +186,15 @@ class _Chooser:
         ranked = []
         for candidate in candidates:
             camera = candidate.typical.value.camera
-            beside, of_color = (
-                _beside(candidate.topic, topic),
-                _beside(candidate.topic, color.channel.topic),
-            )
+            beside = _beside(candidate.topic, topic)
+            of_color = _beside(candidate.topic, color.channel.topic)
             beside_it = beside and (role == "color" or not of_color)
             info_frame = camera.frame or (color.typical().frame if of_color else "")
             fits = size is None or size == (camera.width, camera.height)
             if beside_it or (info_frame == frame and (fits or beside)):
                 why = f"beside {topic}" if beside else f"of the frame and size of {topic}"
-                merit = (
-                    beside_it,
-                    info_frame == frame,
-                    fits,
-                    beside,
-                    len(candidate.choice.channel.payloads),
-                )
+                count = len(candidate.choice.channel.payloads)
+                merit = beside_it, info_frame == frame, fits, beside, count
                 ranked.append((merit, [-ord(c) for c in candidate.topic], why, candidate.choice))
             else:
                 pixels = f", {size[0]} x {size[1]}" if size else ""

@@ -46,7 +46,10 @@ class CameraView:
         size: tuple[int, int],
         begin: float | None = None,
     ) -> CameraView:
-        """View of `size` on the simulated band from `begin` [s] (its release) on, and the hand."""
+        """The view of `size` that holds the simulated band around its release.
+
+        It holds the band from `begin` [s] on, where that is given.
+        """
         release = simulated.release
         times = np.linspace(release + AROUND[0], release + AROUND[1], STEPS)
         times = times if begin is None else np.append(times, np.linspace(begin, release, STEPS))

@@ -9,7 +9,8 @@ import numpy as np
 from mcap.records import Schema
 from scipy.spatial.transform import Rotation
 
-from pipeline.recording.input.container import Channel, Container
+from pipeline.recording.input.container import Container
+from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.topics import choose
 
 COUNT, RATE = 200, 100.0

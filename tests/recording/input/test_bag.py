@@ -13,7 +13,8 @@ from rosbags.rosbag2 import Writer as BagWriter
 
 from pipeline.base.errors import UserError
 from pipeline.recording.input.bag import missing_parts, name_of, once, parts_of, sha256
-from pipeline.recording.input.container import OVERHEAD, read_container
+from pipeline.recording.input.container import read_container
+from pipeline.recording.input.contents import OVERHEAD
 from pipeline.recording.input.reader import read_recording
 from tests.recording.split import metadata, split
 from validation.recordings.bag import blind_bag, write_bag
@@ -150,7 +151,7 @@ def test_a_bag_whose_parts_hold_too_much_is_refused(parts, monkeypatch, tmp_path
     total = sum(
         OVERHEAD + len(payload) for channel in read.channels for payload in channel.payloads
     )
-    monkeypatch.setattr("pipeline.recording.input.container.MOST", total - 1)
+    monkeypatch.setattr("pipeline.recording.input.contents.MOST", total - 1)
     with pytest.raises(UserError, match="holds more than"):
         read_container(parts[0])
     read_container(shutil.copy(parts[1], tmp_path / "alone.mcap"))

@@ -19,7 +19,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.writer import CompressionType, IndexType, Writer
 
 from pipeline.base.errors import UserError
-from pipeline.recording.input import container
+from pipeline.recording.input import contents
 from pipeline.recording.input.container import read_container
 from pipeline.recording.input.records import MAGIC
 
@@ -219,7 +219,7 @@ def test_cameras_that_play_no_role_give_way_where_a_file_is_too_large(
     tmp_path, monkeypatch
 ) -> None:
     """What `ros2 bag record -a` takes of a RealSense: two infrared cameras beside what is used."""
-    monkeypatch.setattr(container, "MOST", 3000)
+    monkeypatch.setattr(contents, "MOST", 3000)
     idle, used = bytes(1000), bytes(300)
     topics = [SCHEMA, channel(), channel(2, "/camera/infra1/image_raw"), channel(3, "/airy")]
     sent = [message(k, 1 + k % 2, (used, idle)[k % 2]) for k in range(6)]

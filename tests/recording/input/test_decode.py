@@ -15,7 +15,7 @@ from mcap_ros2._dynamic import serialize_dynamic
 from rosbags.typesys import Stores, get_typestore
 
 from pipeline.base.errors import UserError
-from pipeline.recording.input.container import Channel
+from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.decode import Unreadable, decoder
 from pipeline.recording.input.readings import read_wrench
 from pipeline.recording.input.standard import guessed

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from pipeline.base.errors import UserError
 from pipeline.recording.input import sets
-from pipeline.recording.input.container import Channel
+from pipeline.recording.input.contents import Channel
 from tests.recording.input.messages import CAMERA, channel, chosen, info, picture, pose_fields
 
 RATE, COUNT = 100.0, 800

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
 from pipeline.recording.input import kinematics
-from pipeline.recording.input.container import Channel
+from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.decode import Unreadable
 from tests.recording.input.messages import (
     COUNT,

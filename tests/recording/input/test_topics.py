@@ -8,7 +8,7 @@ import pytest
 from mcap.records import Schema
 
 from pipeline.base.errors import UserError
-from pipeline.recording.input.container import Channel
+from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.topics import camera_of
 from tests.recording.input.messages import (
     CAMERA,

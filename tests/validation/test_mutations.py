@@ -17,7 +17,7 @@ from validation.recordings.small import (
     write_small,
 )
 
-EACH = 5
+EACH = 10
 SORTS = (outcomes.SAME, outcomes.SAID, outcomes.LINE)
 CELLS = [*zip(FAMILIES, ("zstd", "lz4", "plain", "unchunked"), strict=True), ("json", "garbage")]
 

@@ -36,10 +36,10 @@ def _paths(value: object, above: tuple) -> Iterator[tuple]:
         keys = list(value)
     else:
         keys = [0] if isinstance(value, list) and value else []
-    known = []
+    kinds = []
     for key in keys:
         yield (*above, key)
         kind = list(value[key]) if isinstance(value[key], dict) else None
-        if kind is None or kind not in known:
+        if kind is None or kind not in kinds:
             yield from _paths(value[key], (*above, key))
-        known.append(kind)
+        kinds.append(kind)

@@ -1,7 +1,6 @@
 """A search in PhysX: its results stay where launches fail; who threw what stands in its place."""
 
 import json
-import shutil
 import sys
 from types import SimpleNamespace
 
@@ -13,7 +12,6 @@ from pipeline.simulator.parameters import Parameters
 from tests.project import DEFAULTS
 from validation.engines.physx import search
 from validation.engines.physx.search import OURS, PHYSX
-from validation.projects import ROUGH, set_params
 
 THETAS = np.array([[2.2e5, 0.45, 3e-3, 1.0, 1.0], [1.8e5, 0.40, 2e-3, 1.0, 1.0]])
 
@@ -31,10 +29,8 @@ def searched(tmp_path, monkeypatch):
     monkeypatch.setattr(search, "release", lambda: "0")
     context = {"versions": {}}
     monkeypatch.setattr(search, "environment", lambda _, command: context | {"command": command})
-    monkeypatch.setattr(sys, "argv", ["search", "band1"])
+    monkeypatch.setattr(sys, "argv", ["search", "band1", "--params", str(DEFAULTS)])
     monkeypatch.chdir(tmp_path)
-    shutil.copy(DEFAULTS, "params.yaml")
-    set_params(tmp_path, {f"sling.{name}": value for name, value in ROUGH.items()})
     return tmp_path / "reports/validation/physx-band1.json"
 
 

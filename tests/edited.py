@@ -31,11 +31,15 @@ def edits(content: dict) -> Iterator[tuple[str, dict]]:
 
 
 def _paths(value: object, above: tuple) -> Iterator[tuple]:
-    """Of all values below; of a list its first is enough."""
+    """Of all values below; of a list its first is enough, and so it is within objects alike."""
     if isinstance(value, dict):
         keys = list(value)
     else:
         keys = [0] if isinstance(value, list) and value else []
+    kinds = []
     for key in keys:
         yield (*above, key)
-        yield from _paths(value[key], (*above, key))
+        kind = list(value[key]) if isinstance(value[key], dict) else None
+        if kind is None or kind not in kinds:
+            yield from _paths(value[key], (*above, key))
+        kinds.append(kind)

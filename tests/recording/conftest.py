@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from pipeline.episode.episode import Episode
 from pipeline.params import Params, load
-from pipeline.recording.build import Checked, process
+from pipeline.recording.build import Checked, episode_of, process
 from pipeline.recording.masks.ridge import RidgeMask
 from tests import once
 from tests.project import DEFAULTS
@@ -33,6 +34,12 @@ def seen(tmp_path_factory):
 def checked(seen, params) -> Checked:
     """`seen`, worked out once; to be read only."""
     return process(seen[0], params.bands["band1"], params)
+
+
+@pytest.fixture(scope="session")
+def episode(checked, params) -> Episode:
+    """Of `seen`; to be read only."""
+    return episode_of(checked, "band1", params)
 
 
 @pytest.fixture(scope="session")

@@ -16,11 +16,6 @@ from pipeline.recording.signals import signals_of
 from validation.recordings.bag import EYE, Truth, blind_bag, edit, scores
 
 
-@pytest.fixture(scope="module")
-def episode(seen, params) -> Episode:
-    return build_episodes(seen[0], "band1", params)[0][0]
-
-
 def signals(path, params):
     return signals_of(Pull.of(read_recording(path, params.setup), params.setup), params)
 

@@ -17,16 +17,11 @@ from pipeline.recording.input.reader import Recording, read_recording
 from validation.recordings.foxglove_bag import translate
 
 
-@pytest.fixture(scope="module")
-def usual(seen, params) -> Episode:
-    return build_episodes(seen[0], "band1", params)[0][0]
-
-
 @pytest.mark.parametrize("encoding", ["protobuf", "json"])
-def test_foxglove_schemas_give_the_same_episode(encoding, usual, seen, params, tmp_path) -> None:
+def test_foxglove_schemas_give_the_same_episode(encoding, episode, seen, params, tmp_path) -> None:
     path = tmp_path / "foxglove.mcap"
     translate(seen[0], path, encoding)
-    assert_same_episode(build_episodes(path, "band1", params)[0][0], usual)
+    assert_same_episode(build_episodes(path, "band1", params)[0][0], episode)
 
 
 def test_raw_pictures_are_what_the_packed_ones_hold(seen, params, tmp_path) -> None:

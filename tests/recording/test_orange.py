@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from pipeline.params import BandParams, load
 from pipeline.recording.build import episode_of, process
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, ROOT
 
-RECORDING = Path(__file__).parents[3] / "shared/recordings/orange.mcap"
+FOLDER = ROOT.parent / "shared/recordings"
+BAND = BandParams(source="recording", mass=0.0408, diameter=0.010, rest_length=0.52)
 
 pytestmark = pytest.mark.skipif(
-    not RECORDING.exists(), reason="the recording of the orange band is not beside the project"
+    not FOLDER.exists(), reason="the recordings of the orange band are not beside the project"
 )
 
 
 @pytest.fixture(scope="module")
 def built():
     params = load(DEFAULTS)
-    band = BandParams(source="recording", mass=0.0408, diameter=0.010, rest_length=0.52)
-    params = params.model_copy(update={"bands": {**params.bands, "orange": band}})
-    done = process(RECORDING, band, params)
+    params = params.model_copy(update={"bands": {**params.bands, "orange": BAND}})
+    done = process(FOLDER / "orange.mcap", BAND, params)
     return done, episode_of(done, "orange", params)
 
 
@@ -40,6 +38,16 @@ def test_events_and_force(episode) -> None:
     assert np.abs(episode.force[episode.time < 0.8]).max() < 0.1
     held = (episode.time > 6.5) & (episode.time < 7.9)
     np.testing.assert_allclose(episode.position[held], [[0, -0.4, 0]] * held.sum(), atol=2e-3)
+
+
+def test_no_check_fires_on_a_sound_recording(built) -> None:
+    assert built[0].findings == []
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("name", ["orange_2", "orange_3"])
+def test_no_check_fires_on_its_other_recordings(name: str) -> None:
+    assert process(FOLDER / f"{name}.mcap", BAND, load(DEFAULTS)).findings == []
 
 
 def test_clouds_of_the_drawn_band(built) -> None:

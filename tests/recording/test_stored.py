@@ -12,11 +12,10 @@ from pipeline.recording.build import build_episodes
 
 
 @pytest.fixture
-def layout(tmp_path: Path, seen, params) -> Layout:
+def layout(tmp_path: Path, seen, episode, params) -> Layout:
     """Of a project that keeps the episode of a recording of band1."""
     layout = Layout(tmp_path)
-    episodes, _ = build_episodes(seen[0], "band1", params)
-    stored.keep(seen[0], episodes, params, layout)
+    stored.keep(seen[0], [episode], params, layout)
     return layout
 
 

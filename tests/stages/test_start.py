@@ -142,27 +142,36 @@ def test_a_stage_has_one_thread_of_blas_whatever_the_machine() -> None:
 
 
 def test_a_stage_imports_no_library_that_it_does_not_use() -> None:
-    """Each costs seconds of a run's start: networks and meshes, plots, tables."""
+    """Each costs seconds of a run's start: networks and meshes, plots, tables.
+
+    In few processes, in which further stages are imported after those before.
+    """
     names = [file.stem for file in (ROOT / "stages").glob("*.py")]
-    light = [name for name in names if name not in ("__init__", "policy", "report", "card")]
+    light = [name for name in names if name not in ("__init__", *"policy report card".split())]
     assert len(light) >= 8
-    for stages, heavy in (
-        (light, "torch open3d matplotlib pandas sklearn cma onnx onnxruntime transformers rsl_rl"),
-        ([name for name in light if name != "episode"], "cv2"),
-        (["record", "episode", "floor"], "warp"),
-        (["report"], "torch open3d cv2 cma"),
-        (["card"], "torch cma"),
+    without = [name for name in light if name != "episode"]
+    heavy = "torch open3d matplotlib pandas sklearn cma onnx onnxruntime transformers rsl_rl"
+    for steps in (
+        [(without, f"{heavy} cv2"), (["episode"], heavy)],
+        [(["record", "episode", "floor"], "warp")],
+        [(["report"], "torch open3d cv2 cma"), (["card"], "torch cma")],
     ):
-        code = f"import sys, {', '.join(f'stages.{name}' for name in stages)}\n"
-        code += f"print(*set({heavy.split()}) & sys.modules.keys())"
+        code = "import sys\n"
+        for stages, unused in steps:
+            code += f"import {', '.join(f'stages.{name}' for name in stages)}\n"
+            code += f"print(*set({unused.split()}) & sys.modules.keys())\n"
         done = python("-c", code)
-        assert (done.returncode, done.stdout.strip()) == (0, ""), (stages, done)
+        assert (done.returncode, done.stdout.split()) == (0, []), (steps, done)
 
 
-@pytest.mark.parametrize("after", ["", "; true"])  # with it the shell stays around the stage
-@pytest.mark.parametrize("deaf", [False, True])  # to an interrupt, as in a shell's background
+@pytest.mark.parametrize(("after", "deaf"), [("", True), ("; true", False)])
 def test_a_stage_ends_with_its_dvc(after: str, deaf: bool, tmp_path: Path) -> None:
-    """What stands for DVC starts it as DVC does."""
+    """What stands for DVC starts it as DVC does.
+
+    Args:
+        after: With it the shell stays around the stage.
+        deaf: To an interrupt, as in a shell's background.
+    """
     (tmp_path / "stage.py").write_text(f"""
 import os, pathlib, signal, time
 from stages import start

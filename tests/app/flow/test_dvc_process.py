@@ -52,9 +52,10 @@ def test_the_lock_of_this_project() -> None:
     data = LockYAML().load(text)
     assert type(data) is dict, "dvc.lock begins otherwise: it went through the slow parser"
     assert written(LockYAML(), data) == text
-    data["stages"].popitem()
-    name = next(iter(data["stages"]))
-    data["stages"][name]["cmd"] = "another"
+    first, *_, last = names = list(data["stages"])
+    for name in {*names[20:], last}:  # DVC's own way takes its time
+        del data["stages"][name]
+    data["stages"][first]["cmd"] = "another"
     assert written(LockYAML(), data) == written(YAML(), data)
 
 

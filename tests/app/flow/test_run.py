@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -12,9 +11,8 @@ import pytest
 from app.flow import guard, run
 from app.flow.log import FOLDER
 from pipeline.base.errors import UserError
-from tests.app.flow.serving import SECONDS, ask, serving
 from tests.app.flow.toy import Toy, stage
-from tests.project import python, until
+from tests.project import python
 from validation.projects import CLI
 
 GPU = {"gpu": True}
@@ -117,35 +115,6 @@ def test_the_next_flow_goes_on_and_an_unchanged_output_ends_it(toy: Toy) -> None
     assert states == {
         "top": "ran", "side@left": "fresh", "side@right": "fresh", "bottom": "fresh", None: "ran",
     }  # fmt: skip
-
-
-@pytest.mark.slow
-def test_the_ui_shows_runs_that_were_and_the_one_that_is(tmp_path: Path, history: Path) -> None:
-    """By a server of Prefect's."""
-    stages = {"top": stage("top", "word"), "low": stage("low", "top.out")}
-    toy = Toy(tmp_path / "toy", stages, word="one\n")
-    shutil.copytree(history, toy.folder / ".prefect")
-    assert sling(toy).returncode == 0
-    with serving(toy.folder, toy.environment) as (url, _):
-
-        def shown() -> list[dict]:
-            return ask(f"{url}/api", "/flow_runs/filter", {"sort": "START_TIME_ASC"})
-
-        until(lambda: [shown_run["state_name"] for shown_run in shown()] == ["Completed"], SECONDS)
-        (toy.folder / "word").write_text("bad\n")
-        done = sling(toy)
-        assert f"seen at {url}" in done.stderr
-        until(
-            lambda: [shown_run["state_name"] for shown_run in shown()] == ["Completed", "Failed"],
-            SECONDS,
-        )
-        graph = ask(f"{url}/api", f"/flow_runs/{shown()[0]['id']}/graph-v2")
-        nodes = {node["label"]: node for _, node in graph["nodes"]}
-        assert [node["id"] for node in nodes["low"]["parents"]] == [nodes["top"]["id"]]
-        message = ask(f"{url}/api", "/logs/filter", {})
-        assert {"top works", "error: word: says bad; write something else"} <= {
-            record["message"] for record in message
-        }
 
 
 def test_two_flows_in_one_folder_are_refused(tmp_path, monkeypatch) -> None:

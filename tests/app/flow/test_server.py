@@ -7,7 +7,6 @@ import shutil
 import socket
 import subprocess
 import sys
-import time
 import urllib.request
 from pathlib import Path
 
@@ -15,9 +14,10 @@ import psutil
 import pytest
 
 from app.flow import server
-from app.flow.log import RunLog
 from pipeline.base.errors import UserError
 from tests.app.flow.serving import SECONDS, ask, serving
+from tests.app.flow.test_run import sling
+from tests.app.flow.toy import Toy, stage
 from tests.project import ROOT, alive, until
 
 HERE = Path(__file__).parent
@@ -140,12 +140,14 @@ def listening(pid: int) -> set[tuple[str, int]]:
 
 
 @pytest.mark.slow
-def test_the_ui_is_this_projects_alone_and_keeps_its_history(tmp_path: Path, history) -> None:
-    root, other = tmp_path / "mine", tmp_path / "other"
-    root.mkdir(), other.mkdir()
+def test_the_ui_is_this_projects_alone_and_shows_its_runs(tmp_path: Path, history) -> None:
+    """Those that were, and the one that is."""
+    stages = {"top": stage("top", "word"), "low": stage("low", "top.out")}
+    toy, other = Toy(tmp_path / "mine", stages, word="one\n"), tmp_path / "other"
+    other.mkdir()
+    root = toy.folder
     shutil.copytree(history, root / ".prefect")  # of an earlier server
-    with RunLog(root, "kept", []) as run:
-        run.begins("stage")
+    assert sling(toy).returncode == 0
     with serving(root, environment(CONNECTIONS=str(root / "connections"))) as (url, process):
         port = int(url.rpartition(":")[2])
         assert listening(process.pid) == {("127.0.0.1", port)}
@@ -164,6 +166,22 @@ def test_the_ui_is_this_projects_alone_and_keeps_its_history(tmp_path: Path, his
             assert text.index(allowed) < text.index("<script") and "Prefect" in text
         settings = ask(url, "/api/admin/settings")["server"]
         assert settings["analytics_enabled"] is settings["ui"]["show_promotional_content"] is False
-        until(lambda: ask(url, "/api/flow_runs/filter", {}), SECONDS)
-        time.sleep(3)  # Prefect's services begin within a second or two
+
+        def shown() -> list[dict]:
+            return ask(url, "/api/flow_runs/filter", {"sort": "START_TIME_ASC"})
+
+        def states() -> list[str]:
+            return [run["state_name"] for run in shown()]
+
+        until(lambda: states() == ["Completed"], SECONDS)
+        (root / "word").write_text("bad\n")
+        assert f"seen at {url}" in sling(toy).stderr
+        until(lambda: states() == ["Completed", "Failed"], SECONDS)
+        graph = ask(url, f"/api/flow_runs/{shown()[0]['id']}/graph-v2")
+        nodes = {node["label"]: node for _, node in graph["nodes"]}
+        assert [node["id"] for node in nodes["low"]["parents"]] == [nodes["top"]["id"]]
+        message = ask(url, "/api/logs/filter", {})
+        assert {"top works", "error: word: says bad; write something else"} <= {
+            record["message"] for record in message
+        }
     assert not (root / "connections").exists(), (root / "connections").read_text()

@@ -1,11 +1,37 @@
 """The recordings of tests/recording, looked at once."""
 
+from collections.abc import Iterator
+from types import SimpleNamespace
+
 import pytest
 
 from app.preflight.check import Look, look_at
+from pipeline.params import Params
+from pipeline.params.lab import BandParams
+from pipeline.recording.build import Checked
+from pipeline.recording.pulls import Pull
 from tests.recording.conftest import blind, masked, params, seen
 
 __all__ = ["blind", "masked", "params", "seen"]
+PROCESSED: dict[str, Checked] = {}
+
+
+def processed_once(pull: Pull, band: BandParams, params: Params) -> Checked:
+    """`Checked.of`, which for equal pulls of a file is worked out once in all these tests."""
+    if params.cloud.mask == "folder":  # the masks may be others
+        return Checked.of(pull, band, params)
+    settings = params.model_dump(exclude={"run", "bands"})
+    key = repr((pull.recording.path, pull.recording.sha256, pull.number, band, settings))
+    if key not in PROCESSED:
+        PROCESSED[key] = Checked.of(pull, band, params)
+    return PROCESSED[key]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def each_pull_is_processed_once() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("app.preflight.check.Checked", SimpleNamespace(of=processed_once))
+        yield
 
 
 @pytest.fixture(scope="session")

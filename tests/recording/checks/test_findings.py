@@ -9,8 +9,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.params import BandParams, load
-from pipeline.recording.build import process
 from pipeline.recording.checks import (
     camera,
     container,
@@ -27,7 +25,7 @@ from pipeline.recording.checks.table import CHECKS, findings_of
 from pipeline.recording.delays import Estimate
 from pipeline.recording.input.clocks import ClockRate
 from pipeline.recording.tips import LensFactor
-from tests.project import DEFAULTS, ROOT, with_
+from tests.project import with_
 from tests.recording.checks.made import abouts, with_facts, with_recording, with_results
 from tools import checks
 
@@ -233,17 +231,6 @@ def test_a_loop_of_poses_that_does_not_close_is_said(checked) -> None:
     geometry = replace(checked.pull.geometry, loop=loop)
     open_ = replace(checked, pull=replace(checked.pull, geometry=geometry))
     assert "loop" in abouts(frames.findings(open_))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["orange", "orange_2", "orange_3"])
-def test_no_check_fires_on_a_sound_recording(name: str) -> None:
-    file = ROOT.parent / "shared/recordings" / f"{name}.mcap"
-    if not file.exists():
-        pytest.skip("the recordings of the orange band are not beside the project")
-    params = load(DEFAULTS)
-    band = BandParams(source="recording", mass=0.0408, diameter=0.010, rest_length=0.52)
-    assert process(file, band, params).findings == []
 
 
 @pytest.mark.fires("clock_drift")

@@ -343,19 +343,26 @@ def test_a_drift_is_told_by_the_least_delays(rate) -> None:
     assert clocks.drift(stamp[:1000], stamp[:1000])[1] == np.inf
 
 
+LONG = Truth(end=9.0)
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory, params) -> Recording:
+    return read(tmp_path_factory.mktemp("long"), params, truth=LONG)
+
+
 @pytest.mark.parametrize("roles", [("wrench",), ("color", "depth"), ("pose",)])
 @pytest.mark.parametrize("rate", [-3e-3, 1.5e-3])
-def test_a_clock_that_drifts_is_put_at_the_forces_rate(tmp_path, params, roles, rate) -> None:
+def test_a_clock_that_drifts_is_put_at_the_forces_rate(
+    tmp_path, params, sound, roles, rate
+) -> None:
     """And stays as late as it was at its first message."""
-    truth = Truth(end=9.0)
 
     def drifts(stamp: int, message) -> None:
         late = round((stamp - START) * rate)
         message.header = head(stamp + late, message.header.frame_id)
 
-    sound = read_recording(blind_bag(tmp_path, truth), params.setup)
-    change = edit(**dict.fromkeys(roles, drifts))
-    odd = read_recording(blind_bag(tmp_path, truth, change=change), params.setup)
+    odd = read(tmp_path, params, truth=LONG, change=edit(**dict.fromkeys(roles, drifts)))
     by_force = rate * ("wrench" in roles)  # whose clock counts
     for role, stream in odd.streams.items():
         moves = role != "wrench" and (role in roles or "wrench" in roles)

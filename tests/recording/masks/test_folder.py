@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +13,11 @@ import pytest
 from PIL import Image
 
 from pipeline.base.errors import UserError
-from pipeline.recording.build import build_episodes, process_pull, process_pulls
+from pipeline.recording.build import Checked, build_episodes, episode_of, process, process_pull
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.masks import masker
 from pipeline.recording.pulls import Pull
+from pipeline.recording.view import View
 from tests.recording.joined import joined
 from validation.recordings import looks
 from validation.recordings.looks import LOOKS
@@ -25,6 +27,19 @@ from validation.recordings.looks import LOOKS
 def by_folder(params):
     cloud = params.cloud.model_copy(update={"mask": "folder"})
     return params.model_copy(update={"cloud": cloud})
+
+
+@pytest.fixture(scope="module")
+def folded(masked, by_folder) -> Checked:
+    """`seen` by its masks; to be read only."""
+    return process(masked, by_folder.bands["band1"], by_folder)
+
+
+def view_beside(folded: Checked, mine: Path) -> View:
+    """Its view, whose masks are beside another recording."""
+    view = copy(folded.view)
+    view.recording = replace(view.recording, path=mine)
+    return view
 
 
 @pytest.fixture
@@ -38,10 +53,8 @@ def files(recording: Path) -> list[Path]:
     return sorted(recording.with_suffix(".masks").iterdir())
 
 
-def test_the_same_masks_give_the_same_episode_to_the_byte(masked, params, by_folder) -> None:
-    ours, theirs = (
-        build_episodes(masked, "band1", params_i)[0][0] for params_i in (params, by_folder)
-    )
+def test_the_same_masks_give_the_same_episode_to_the_byte(episode, folded, by_folder) -> None:
+    ours, theirs = episode, episode_of(folded, "band1", by_folder)
     for name in ("time", "position", "velocity", "force", "opening", "cloud_time", "camera"):
         assert getattr(ours, name).tobytes() == getattr(theirs, name).tobytes()
     assert [cloud.tobytes() for cloud in ours.clouds] == [
@@ -51,18 +64,15 @@ def test_the_same_masks_give_the_same_episode_to_the_byte(masked, params, by_fol
     assert theirs.metadata["preprocessing"]["mask"] == "folder"
 
 
-def test_each_mask_counts_for_its_own_picture_and_no_other(mine, params, by_folder) -> None:
+def test_each_mask_counts_for_its_own_picture_and_no_other(mine, checked, by_folder) -> None:
     """Bands of one bit a pixel, as some tools write them; one is all black."""
     black = files(mine)[20]
     whole = np.asarray(Image.open(black)) > 0
     assert whole.any()
     Image.fromarray(np.zeros_like(whole)).save(black)
     Image.fromarray(np.asarray(Image.open(files(mine)[21])) > 0).save(files(mine)[21])
-    ours, theirs = (
-        process_pulls(mine, params.bands["band1"], params_i)[0][0]
-        for params_i in (params, by_folder)
-    )
-    expected = ours.clouds.pixels.copy()
+    theirs = process(mine, by_folder.bands["band1"], by_folder)
+    expected = checked.clouds.pixels.copy()
     expected[20] = 0
     assert theirs.clouds.pixels.tolist() == expected.tolist()
 
@@ -74,13 +84,10 @@ def test_a_late_camera_does_not_change_the_names(masked, params, by_folder) -> N
     assert done.clouds.pixels.min() > 0
 
 
-def test_what_a_mask_marks_where_the_band_cannot_be_is_not_the_band(
-    masked, mine, by_folder
-) -> None:
+def test_what_a_mask_marks_where_the_band_cannot_be_is_not_the_band(mine, folded) -> None:
     for file in files(mine):
         Image.fromarray(np.full((240, 320), 7, np.uint8)).save(file)
-    view = process_pulls(masked, by_folder.bands["band1"], by_folder)[0][0].view
-    view.recording = replace(view.recording, path=mine)
+    view = view_beside(folded, mine)
     mask = masker("folder", view)
     for _, frame in view.frames():
         np.testing.assert_array_equal(mask.mask(frame), frame.near)
@@ -153,14 +160,23 @@ SPOILED = {
 }
 
 
+WHOLE = "no folder", "cut off", "all black"  # as an episode is refused; the others: their masks
+
+
 @pytest.mark.parametrize("how", SPOILED)
-def test_masks_that_cannot_be_used_are_named_in_one_line(how, mine, by_folder) -> None:
+def test_masks_that_cannot_be_used_are_named_in_one_line(how, mine, folded, by_folder) -> None:
     spoil, words = SPOILED[how]
     name = files(mine)[3].name
     spoil(mine)
     with pytest.raises(UserError, match=words.replace("NAME", name)) as caught:
-        build_episodes(mine, "band1", by_folder)
-    assert str(caught.value).startswith(f"{mine}: ") and "\n" not in str(caught.value)
+        if how in WHOLE:
+            build_episodes(mine, "band1", by_folder)
+        view = view_beside(folded, mine)
+        mask = masker("folder", view)
+        for _, frame in view.frames():
+            mask.mask(frame)
+    place = f"{mine}: " if how in WHOLE else str(mine.with_suffix(".masks"))
+    assert str(caught.value).startswith(place) and "\n" not in str(caught.value)
 
 
 def test_masks_of_the_first_pull_alone_leave_the_second_out(masked, tmp_path, by_folder) -> None:

@@ -186,8 +186,12 @@ class Residuals:
         return np.concatenate([np.full(3 * len(self.samples), force), bins, bins])
 
     def gone(self) -> np.ndarray:
-        """Way of the band's middle from where it was drawn, as each bin saw it [m], shape (M,)."""
-        drawn = self.reference[self.rule.frames(self.episode)[0], self.sling.middle]
+        """Way of the band's middle from where it was drawn, as each bin saw it [m], shape (M,).
+
+        Where no picture of the drawn band counts, the last one before the release shows it.
+        """
+        last = max(np.searchsorted(self.episode.cloud_time, self.episode.release_time) - 1, 0)
+        drawn = self.reference[min(self.rule.frames(self.episode)[0], last), self.sling.middle]
         return np.linalg.norm(self.reference[self.frame, self.sling.middle] - drawn, axis=1)
 
     def columns(self, left: np.ndarray) -> dict[str, np.ndarray]:

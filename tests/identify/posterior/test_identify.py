@@ -205,6 +205,22 @@ def test_pictures_count_by_time_and_by_the_measured_cloud(exact):
     assert len(short.samples(episode)) < len(Rule().samples(episode))
 
 
+def test_where_no_picture_of_the_drawn_band_counts_the_way_begins_at_the_last_one_before(exact):
+    """A camera that drops most pictures: the recoil's discrepancy stays a finite share."""
+    episode = exact[0]
+    since = episode.cloud_time - episode.release_time
+    kept = np.flatnonzero((since < -0.6) | (since > 0))
+    few = replace(
+        episode,
+        cloud_time=episode.cloud_time[kept],
+        clouds=[episode.clouds[number] for number in kept],
+    )
+    result = found_of(few)
+    (expansion,) = result.fit.expansions
+    assert expansion.residuals.gone().min() > 0.03
+    assert 0 < expansion.recoil_discrepancy < 1
+
+
 def test_a_recording_that_never_shows_the_band_is_refused(exact):
     empty = replace(exact[0], clouds=[cloud[:3] for cloud in exact[0].clouds])
     with pytest.raises(UserError, match="no picture of the drawn band .* shows 4 points of it"):

@@ -74,7 +74,7 @@ def before(job: OneRecording) -> dict:
 
 
 def figures(lines: list[dict]) -> dict:
-    """Each band's summary, and what they say together."""
+    """Summaries of bands, and what they say together."""
     by_band = summaries(lines, "band")
     return {"together": landings.together(by_band), "bands": by_band}
 

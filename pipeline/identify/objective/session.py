@@ -25,7 +25,7 @@ from pipeline.params.identification import OUR_ENGINE, MethodParams
 PIPELINE = Path(__file__).parents[2]
 SOURCES = (  # the code that a term of the loss depends on
     *(PIPELINE / name for name in ("episode", "identify/objective", "simulator")),
-    *(PIPELINE / "base" / name for name in ("failures.py", "native.py")),
+    *(PIPELINE / "base" / name for name in ("failures.py", "minimum_jerk.py", "native.py")),
 )
 
 

@@ -209,11 +209,11 @@ def test_where_no_picture_of_the_drawn_band_counts_the_way_begins_at_the_last_on
     """A camera that drops most pictures: the recoil's discrepancy stays a finite share."""
     episode = exact[0]
     since = episode.cloud_time - episode.release_time
-    kept = np.flatnonzero((since < -0.6) | (since > 0))
+    others = np.flatnonzero((since < -0.6) | (since > 0))
     few = replace(
         episode,
-        cloud_time=episode.cloud_time[kept],
-        clouds=[episode.clouds[number] for number in kept],
+        cloud_time=episode.cloud_time[others],
+        clouds=[episode.clouds[number] for number in others],
     )
     result = found_of(few)
     (expansion,) = result.fit.expansions

@@ -22,7 +22,7 @@ def searched(tmp_path, monkeypatch):
 
     def fake_search(self, engine):
         best = dict(zip(self.box.names, THETAS[(OURS, PHYSX).index(engine)], strict=True))
-        return SimpleNamespace(best=lambda: best, total=np.array([1.0, np.inf])), 2.0
+        return SimpleNamespace(best_row=lambda: best, total=np.array([1.0, np.inf])), 2.0
 
     monkeypatch.setattr(search.Comparison, "search", fake_search)
     monkeypatch.setattr(search.Comparison, "losses", lambda self, thetas: {})

@@ -35,7 +35,7 @@ def write_report(
     Returns:
         What the file holds.
     """
-    script = Path(sys._getframe(1).f_code.co_filename).resolve()
+    script = Path(sys._getframe(1).f_code.co_filename)
     module = ".".join(script.relative_to(ROOT).with_suffix("").parts).removesuffix(".__main__")
     provenance = environment(device, f"python -m {module} {arguments}".rstrip(), script)
     provenance["versions"] |= versions or {}

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 from rsl_rl.algorithms import PPO
+from rsl_rl.utils import check_nan
 from torch import nn
 
 from pipeline.base.machine import one_thread
@@ -173,7 +174,7 @@ def train(
             if next_log_std is not None:
                 with torch.no_grad():
                     network.distribution.log_std_param.fill_(next_log_std)
-            if worth > best:
+            if not weights or worth > best:
                 best, chosen, weights = worth, number, copy.deepcopy(policy.state_dict())
             if progress:
                 progress.advance(1, summary(error))
@@ -197,6 +198,7 @@ def _iterate(ppo: PPO, env: SlingshotEnv, steps: int) -> float:
     with torch.inference_mode():
         for _ in range(steps):
             observed, reward, done, extras = env.step(ppo.act(observed))
+            check_nan(observed, reward, done)
             ppo.process_env_step(observed, reward, done, extras)
             rewards.append(float(reward.mean()))
         ppo.compute_returns(observed)

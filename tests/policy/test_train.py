@@ -1,5 +1,7 @@
 """Training on the toy slingshot, whose landing is known in closed form."""
 
+import itertools
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -126,6 +128,25 @@ def test_without_a_launch_that_lands_it_says_so(settings) -> None:
     assert trained.failures == {"the simulation did not converge": 2 * 4 * 64}
     assert trained.curve["failed_targets"] == [256.0, 256.0]
     assert np.isfinite(trained.policy.draws(np.array([1.9]))).all()
+
+
+@pytest.mark.parametrize("first", [1, 8])
+def test_a_landing_that_is_no_number_is_refused(toy_map, settings, first: int) -> None:
+    """Neither a policy of the iteration before nor a traceback of PyTorch comes of it."""
+    surface, calls = toy_map.surface, itertools.count(1)
+
+    class Broken:
+        reasons, low, high = surface.reasons, surface.low, surface.high
+
+        def __call__(self, draws: np.ndarray):
+            landings = surface(draws)
+            if next(calls) < first:
+                return landings
+            nothing = {"landing_y": np.full(len(draws), np.nan), "failure": 0 * landings.failure}
+            return replace(landings, **nothing)
+
+    with pytest.raises(ValueError, match="NaN"):
+        train(Broken(), short(settings))
 
 
 def test_each_iteration_is_told(toy_map, settings, tmp_path) -> None:

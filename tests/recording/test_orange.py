@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -12,16 +14,18 @@ from tests.project import DEFAULTS, ROOT
 FOLDER = ROOT.parent / "shared/recordings"
 BAND = BandParams(source="recording", mass=0.0408, diameter=0.010, rest_length=0.52)
 
-pytestmark = pytest.mark.skipif(
-    not FOLDER.exists(), reason="the recordings of the orange band are not beside the project"
-)
+
+def recording(name: str) -> Path:
+    if not (file := FOLDER / f"{name}.mcap").exists():
+        pytest.skip(f"{file.name} is not beside the project")
+    return file
 
 
 @pytest.fixture(scope="module")
 def built():
     params = load(DEFAULTS)
     params = params.model_copy(update={"bands": {**params.bands, "orange": BAND}})
-    done = process(FOLDER / "orange.mcap", BAND, params)
+    done = process(recording("orange"), BAND, params)
     return done, episode_of(done, "orange", params)
 
 
@@ -47,7 +51,7 @@ def test_no_check_fires_on_a_sound_recording(built) -> None:
 @pytest.mark.validation
 @pytest.mark.parametrize("name", ["orange_2", "orange_3"])
 def test_no_check_fires_on_its_other_recordings(name: str) -> None:
-    assert process(FOLDER / f"{name}.mcap", BAND, load(DEFAULTS)).findings == []
+    assert process(recording(name), BAND, load(DEFAULTS)).findings == []
 
 
 def test_clouds_of_the_drawn_band(built) -> None:

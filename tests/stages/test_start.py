@@ -164,7 +164,7 @@ def test_a_stage_imports_no_library_that_it_does_not_use() -> None:
         assert (done.returncode, done.stdout.split()) == (0, []), (steps, done)
 
 
-@pytest.mark.parametrize(("after", "deaf"), [("", True), ("; true", False)])
+@pytest.mark.parametrize(("after", "deaf"), [("", False), ("", True), ("; true", False)])
 def test_a_stage_ends_with_its_dvc(after: str, deaf: bool, tmp_path: Path) -> None:
     """What stands for DVC starts it as DVC does.
 

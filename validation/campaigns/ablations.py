@@ -274,6 +274,8 @@ def main() -> None:
             expect_known(params, kind, name)
     if PAPER not in args.methods:
         raise UserError(f"--methods: {PAPER} must be among them, all are compared with it")
+    if args.record and args.report_only:
+        raise UserError("--record and --report-only: one of them")
     if args.record:
         numbers = range(args.first, args.first + args.recordings)
         every = [(band, number) for number in numbers for band in args.bands]

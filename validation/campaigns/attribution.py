@@ -220,7 +220,7 @@ def block(content: dict) -> str:
     there = {", ".join(key): words for key, words in COLUMNS.items()}
     there = {key: words for key, words in there.items() if key in content["figures"]}
     heads = [
-        f"{words} ({len(content['figures'][key][OURS]['mean_bias'])})"
+        f"{words} ({len(next(iter(content['figures'][key].values()))['mean_bias'])})"
         for key, words in there.items()
     ]
     rows = [row("identified by", *heads), "|---|" + "---:|" * len(heads)]
@@ -259,7 +259,7 @@ def main() -> None:
         "pads": "open as fast as the recorded force fell, for every variant",
         "figures": figures(lines),
     }
-    print(block(write_report(args.report, content, "--orange FOLDER")))
+    print(block(write_report(args.report, content, "--orange FOLDER" if args.orange else "")))
 
 
 if __name__ == "__main__":

@@ -348,6 +348,8 @@ def main() -> int:
         for _ in pool.map(run_cell, cells):  # raises what a cell raises
             pass
     results = runner.expect(lines.among(cells), work)
+    if len(results) < len(cells):
+        print(f"{len(results)} of {len(cells)} cells, no report yet; run it again to go on")
     if not given.only and not left and len(results) == len(cells):
         code = digests(Path(__file__), ROOT / "app/cli.py")
         write_report(given.report, report(results) | {"code": code})

@@ -278,7 +278,7 @@ def report_of(name: str) -> Path:
 
 
 def main() -> None:
-    parser = runner.parser(__doc__, None, WORK, page=PAGE)
+    parser = runner.parser(__doc__, None, WORK, page=f"{PAGE} and {README}")
     parser.add_argument("set", choices=[*SETS, ONE_DIP])
     parser.add_argument("--pulls", nargs="+", choices=PULLS)
     parser.add_argument("--keep", action="store_true", help="the episodes, and take those kept")

@@ -149,7 +149,7 @@ def parser(
     work: Path | None = None,
     *,
     many: bool = True,
-    page: Path | None = None,
+    page: Path | str | None = None,
     orange: bool = False,
 ) -> argparse.ArgumentParser:
     """A campaign's arguments.

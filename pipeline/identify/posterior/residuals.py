@@ -188,10 +188,13 @@ class Residuals:
     def gone(self) -> np.ndarray:
         """Way of the band's middle from where it was drawn, as each bin saw it [m], shape (M,).
 
-        Where no picture of the drawn band counts, the last one before the release shows it.
+        Where no picture of the drawn band counts, the hand at the release says it.
         """
-        last = max(np.searchsorted(self.episode.cloud_time, self.episode.release_time) - 1, 0)
-        drawn = self.reference[min(self.rule.frames(self.episode)[0], last), self.sling.middle]
+        episode, first = self.episode, self.rule.frames(self.episode)[0]
+        if episode.cloud_time[first] < episode.release_time:
+            drawn = self.reference[first, self.sling.middle]
+        else:
+            drawn = episode.position[episode.time <= episode.release_time][-1]
         return np.linalg.norm(self.reference[self.frame, self.sling.middle] - drawn, axis=1)
 
     def columns(self, left: np.ndarray) -> dict[str, np.ndarray]:

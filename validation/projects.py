@@ -198,7 +198,10 @@ class MarkedRun:
 
     def left(self, seconds: float = PROMPT, apart: Collection[int] = ()) -> list[str]:
         """Commands of what still lives after so long, but those by number; what does is killed."""
-        alive = lambda: [process for process in self.alive() if process.pid not in apart]  # noqa: E731
+
+        def alive() -> list[psutil.Process]:
+            return [process for process in self.alive() if process.pid not in apart]
+
         wait(lambda: not alive(), seconds)
         left = alive()
         message = [line for process in left if (line := command_line(process))]

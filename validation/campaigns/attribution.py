@@ -259,7 +259,7 @@ def main() -> None:
         "pads": "open as fast as the recorded force fell, for every variant",
         "figures": figures(lines),
     }
-    print(block(write_report(args.report, content, "--orange FOLDER" if args.orange else "")))
+    print(block(write_report(args.report, content, runner.orange_argument(args))))
 
 
 if __name__ == "__main__":

@@ -102,7 +102,7 @@ def params_of(band: str, switch: str) -> Params:
             name: method.model_copy(update=values) for name, method in params.methods.items()
         }
         return params.model_copy(update={"methods": methods})
-    return params.model_copy(update={section: getattr(params, section).model_copy(update=values)})
+    return with_section(params, section, **values)
 
 
 def forces(band: str, outcome: Calibrated, episode: Episode) -> dict:
@@ -220,7 +220,7 @@ def report(args: argparse.Namespace, cases: list[Case], results: list[dict]) -> 
         "figures": effects(results, [*SWITCHES], [PAPER, OURS], rig),
         "results": results,
     }
-    write_report(args.report, content, command + (" --orange FOLDER" if args.orange else ""))
+    write_report(args.report, content, f"{command} {runner.orange_argument(args)}")
     print(f"{args.report}: {len(results)} of {len(cases)} results", flush=True)
     print(block(content))
 

@@ -213,7 +213,7 @@ def report(args: argparse.Namespace, cases: list[Faulty], results: list[dict]) -
         "families": {name: _family(faulty, name) for name in families},
         "results": results,
     }
-    write_report(args.report, content, "--orange FOLDER", digits=5)
+    write_report(args.report, content, runner.orange_argument(args), digits=5)
     print(f"{args.report}: {len(results)} of {len(cases)}, {content['counts']}", flush=True)
     print(f"{len(alarms)} false alarms on {len(sound)} sound recordings")
 

@@ -179,6 +179,11 @@ def parser(
     return options
 
 
+def orange_argument(args: argparse.Namespace) -> str:
+    """What a report's command says of --orange, whose folder is another one elsewhere."""
+    return "--orange FOLDER" if args.orange else ""
+
+
 def prepare(args: argparse.Namespace, work: Callable[[Job], object], jobs: Sequence[Job]) -> None:
     """Make what other jobs need, unless --report-only. Raises UserError when the time is over."""
     if not args.report_only:

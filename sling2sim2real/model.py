@@ -66,8 +66,8 @@ class Band:
 class Theta:
     """The parameters θ of a band; the five are the paper's.
 
-    With `mooney_share`, `upturn`, `softening` and `relaxation`, or some of them, the material is of
-    the law rubber, without them it is neo-Hookean. A value that no material has is a UserError.
+    With some of those that are of rubber the material is of that law, without them it is
+    neo-Hookean. A value that no material has is a UserError.
 
     >>> from sling2sim2real import Theta
     >>> five = Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6)
@@ -88,6 +88,9 @@ class Theta:
         upturn: Of rubber, how much steeper it pulls far out: over (I1 - 3).
         softening: Of rubber, share of the stress that a first stretch takes away near rest.
         relaxation: Of rubber, share of the stress that relaxes in each decade of time.
+        flow: Of rubber, share of the modulus that is added and flows, the faster, the larger its
+            stress is.
+        log_flow_rate: Of rubber, decadic logarithm of the flow's rate [1/s].
         air_drag: Beyond a cylinder's: force for mass and speed [1/s].
         turn_damping: Share of the damping that brakes turns without stretch.
         returned_share: Energy that a launch gets over what the law gives it.
@@ -102,6 +105,8 @@ class Theta:
     upturn: float | None = None
     softening: float | None = None
     relaxation: float | None = None
+    flow: float | None = None
+    log_flow_rate: float | None = None
     air_drag: float = 0.0
     turn_damping: float = 0.0
     returned_share: float = 1.0

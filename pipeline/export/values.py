@@ -116,6 +116,11 @@ def _of_rubber(model: CalibratedBand) -> list[tuple[str, str, str]]:
             " a launch is in their damping.",
         ),
         (
+            "flow, log_flow_rate",
+            f"{100 * theta['flow']:.2g} % of E, 10^{theta['log_flow_rate']:.2g}/s",
+            f"None: as relaxation, after {after}.",
+        ),
+        (
             "mooney_share, upturn",
             f"{theta['mooney_share']:.2g}, {theta['upturn']:.2g}",
             "The shape of the springs' pull, with a share of its own.",

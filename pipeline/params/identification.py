@@ -23,6 +23,8 @@ LAWS: dict[str, dict[str, tuple[float, float]]] = {
         "upturn": (0.0, 1.0),
         "softening": (0.0, 0.9),
         "relaxation": (0.0, 0.2),
+        "flow": (0.0, 1.0),
+        "log_flow_rate": (-1.0, 6.0),
     },
 }
 LEAST_SQUARES = "least_squares"

@@ -14,7 +14,7 @@ from pipeline.simulator.initial import drawn_guess
 from pipeline.simulator.model import GRAVITY, ClampedBand, LaunchHistory, LaunchSetup
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip, Outcome
-from pipeline.simulator.rubber import RUBBER, TIMES, overstress, uniaxial
+from pipeline.simulator.rubber import RUBBER, TIMES, flowing, overstress, uniaxial
 from pipeline.simulator.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.simulator.solver import Options, Slings, run
 
@@ -75,23 +75,31 @@ def schedule_of(setup: LaunchSetup, refine: int = 1) -> Schedule:
     return Schedule(np.concatenate([relax, first, rest]), first_free=RELAX_STEPS)
 
 
-def unrelaxed(
+def memory_of_pull(
     band: ClampedBand, history: LaunchHistory | None, parameters: Parameters, draws: np.ndarray
-) -> np.ndarray:
-    """What share of a drawn band's stress at rest its branches carry besides, shape (N, 8).
+) -> dict[str, np.ndarray]:
+    """What a drawn band's branches carry, each over its stress at rest, by fields of records.LANE.
 
     Of draws (N, 2) by a history, the band's halves taken as straight and, while they are slack, as
     unstretched. A band that is not stretched there carries nothing.
+
+    Returns:
+        `unrelaxed` (N, 8) and `unflowed` (N,).
     """
+    count = len(draws)
     if band.law != RUBBER or history is None:
-        return np.zeros((len(draws), len(TIMES)))
+        return {"unrelaxed": np.zeros((count, len(TIMES))), "unflowed": np.zeros(count)}
     part = np.linspace(0, 1, HISTORY_STEPS + 1)
     drawn = np.linalg.norm(draws, axis=1)[:, None] * (part**2 * (3 - 2 * part))
-    stretch = band.drawn(drawn)
     shape = (parameters.column(name)[:, None] for name in ("mooney_share", "upturn"))
-    stress = uniaxial(stretch, *shape)
-    carried = overstress(stress, history.pull_time / HISTORY_STEPS)
-    return carried * np.exp(-history.pause / TIMES) / np.maximum(stress[:, -1:], 1e-9)
+    stress, step = uniaxial(band.drawn(drawn), *shape), history.pull_time / HISTORY_STEPS
+    at_rest = np.maximum(stress[:, -1], 1e-9)
+    carried = overstress(stress, step) * np.exp(-history.pause / TIMES)
+    rate = 10 ** parameters.column("log_flow_rate")
+    return {
+        "unrelaxed": carried / at_rest[:, None],
+        "unflowed": flowing(stress, step, history.pause, rate) / at_rest,
+    }
 
 
 def launch(
@@ -124,7 +132,7 @@ def launch(
         band = replace(band, stretched=np.maximum(band.stretched, before))
     slings = Slings.of(
         band, parameters, drawn_guess(band, draws), direction=direction,
-        payload=setup.projectile_mass, unrelaxed=unrelaxed(band, setup.history, parameters, draws),
+        payload=setup.projectile_mass, **memory_of_pull(band, setup.history, parameters, draws),
     )  # fmt: skip
     schedule = schedule_of(setup, refine)
 

@@ -44,6 +44,8 @@ def material(
         result["upturn"] = parameters.column("upturn")
         result["softening"] = parameters.column("softening")
         result["relaxation"] = weight / after
+        result["flow"] = parameters.column("flow") / after
+        result["flow_rate"] = 10 ** parameters.column("log_flow_rate")
     result["mu"] = mu = young / (2 * (1 + poisson))
     result["lam"] = young * poisson / ((1 + poisson) * (1 - 2 * poisson)) + mu
     result["damping"], result["scale"] = damping, np.maximum(scale, LEAST_SCALE)

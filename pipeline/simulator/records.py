@@ -61,6 +61,8 @@ MATERIAL = _record(
     "upturn",
     "softening",
     "relaxation",
+    "flow",
+    "flow_rate",
     "turning",
 )
 # of a step that ends at `time` and is `h` long: past and beta as in step.h; Mode, Grip; where the
@@ -77,7 +79,7 @@ STEP = _record(
 # work of the largest stretch before (rubber.h)
 LANE = _record(
     ("direction", 3), "payload", "outcome", ("separation", 5), "lowest", ("hold_force", 3),
-    "iterations", ("unrelaxed", BRANCHES), "worst",
+    "iterations", ("unrelaxed", BRANCHES), "unflowed", "worst",
 )  # fmt: skip
 # what is put out of a step
 OUTPUT = _record(("force", 3), "iterations")

@@ -1,4 +1,4 @@
-// What the law `rubber` adds along an edge to the neo-Hookean material: shape of the curve, softening and relaxation.
+// What the law `rubber` adds along an edge to the neo-Hookean material: shape of the curve, softening, relaxation and flow.
 //
 // Of an edge at stretch l = |g|, incompressible and pulled along, the relaxed nominal stress is that of Biderman's first
 // three terms, Mooney's share m and the upturn c,
@@ -24,16 +24,24 @@
 //
 //   o = forget o_before + follow (p - p_before),   forget = exp(-h/t),  follow = (1 - forget) t/h
 //
+// A last branch adds flow (p(l) - p(q)). Its stress flows the faster, the larger it is, by its fourth power as in Bergstrom
+// and Boyce (1998), o' = p' - r |o/E|^3 o, so that cycles lose work at every speed. Its free energy and its loss are those of
+// the other branches, with r |o/E|^3 in place of 1/t. A step lets it flow by implicit Euler at the rate that it begins with,
+//
+//   o = o_before/(1 + h r |o_before/E|^3) + p - p_before
+//
 // Memory is one number an edge and branch. It knows the stretch alone: a rigid turn changes nothing.
 
 #if RUBBER
 const int BRANCHES = STEP_FOLLOW - STEP_FORGET;
 const real mooney = LAW[MATERIAL_MOONEY], upturn = LAW[MATERIAL_UPTURN], softening = LAW[MATERIAL_SOFTENING], weight = LAW[MATERIAL_RELAXATION];
-real following = zero;  // what a step adds of p's change: w times the sum of `follow`
+const real flow = LAW[MATERIAL_FLOW], flow_rate = LAW[MATERIAL_FLOW_RATE];
+real following = zero;  // what a step adds of p's change: w times the sum of `follow`, and flow
 #define MEMORY(k, i) STATE[(9 * N + (k)) * L + (i)]  // overstress of the branches, then:
 #define STRESS_BEFORE BRANCHES
 #define CARRIED (BRANCHES + 1)                       // what a step adds whatever its end is
 #define WORST (BRANCHES + 2)                         // largest work, over mu
+#define FLOWING (BRANCHES + 3)                       // overstress of the flowing branch
 #define JOIN 0.05                                    // e
 
 // p and `extra` at a stretch, with their slopes by it, and the work of p over mu, 0 in compression
@@ -69,16 +77,23 @@ auto add_rubber = [&](int i, const real (&g)[3], real (&stress)[3], real (&K)[3]
     if (fresh) UNROLL for (int n = 0; n < 3; ++n) K[m][n] += along * g[m] * g[n] + (m == n ? across : zero);
   }
 };
+// what is left of the flowing branch's overstress o after h
+auto unflowed = [&](SC h, real o) -> real {
+  const real strain = o / (mu * (SC)3), square = strain * strain;
+  return o / (one + (zero + h) * flow_rate * square * SQRT(square));
+};
 // of a step; one that relaxes begins with branches that have forgotten part of whatever stress there will be
 auto follow_of = [&](const SC* row, bool relax, int k) -> real { return relax ? LANE[LANE_UNRELAXED + k] : zero + row[STEP_FOLLOW + k]; };
 auto recall = [&](const SC* row, bool relax) {
   real follow = zero;
   UNROLL for (int k = 0; k < BRANCHES; ++k) follow += follow_of(row, relax, k);
-  following = weight * follow;
+  following = weight * follow + flow * (relax ? LANE[LANE_UNFLOWED] : one);
   for (int i = member; i < L - 1; i += T) {
     real carried = relax ? zero : -follow * MEMORY(STRESS_BEFORE, i);
     if (!relax) UNROLL for (int k = 0; k < BRANCHES; ++k) carried += row[STEP_FORGET + k] * MEMORY(k, i);
-    MEMORY(CARRIED, i) = weight * carried;
+    carried *= weight;
+    if (!relax) carried += flow * (unflowed(row[STEP_H], MEMORY(FLOWING, i)) - MEMORY(STRESS_BEFORE, i));
+    MEMORY(CARRIED, i) = carried;
   }
 };
 auto stress_at = [&](int i, real &work) -> real {
@@ -91,6 +106,7 @@ auto start_relaxed = [&]() {
   for (int i = member; i < L - 1; i += T) {
     real work;
     UNROLL for (int k = 0; k < BRANCHES; ++k) MEMORY(k, i) = zero;
+    MEMORY(FLOWING, i) = zero;
     MEMORY(STRESS_BEFORE, i) = stress_at(i, work);
     MEMORY(WORST, i) = LANE[LANE_WORST];
   }
@@ -104,6 +120,7 @@ auto remember = [&](const SC* row, bool relax) {
       const real before = relax ? zero : row[STEP_FORGET + k] * MEMORY(k, i);
       MEMORY(k, i) = before + follow_of(row, relax, k) * change;
     }
+    MEMORY(FLOWING, i) = relax ? LANE[LANE_UNFLOWED] * change : unflowed(row[STEP_H], MEMORY(FLOWING, i)) + change;
     MEMORY(STRESS_BEFORE, i) = p;
   }
 };

@@ -8,6 +8,11 @@ up to the largest stretch that it has seen (Mullins; Ogden and Roxburgh, 10.1098
 Properties of Polymers, 1980, ch. 1; latex over 24 h: docs/real.md). Eight branches carry it, evenly
 in log time from 3 ms to 10^4 s. What is faster is damping. Young's modulus is the one that is left
 after LATER: nobody waits for the slow branches, which in a rollout of some seconds are springs.
+
+`flow` is the share of that modulus with which a further branch pulls, whose overstress o flows by
+its fourth power (Bergstrom and Boyce 1998, 10.1016/S0022-5096(97)00075-6): o' = p' - r |o/E|^3 o, r
+being 10 to the power of `log_flow_rate` [1/s]. It stands for the work that slow cycles lose at
+whatever speed.
 """
 
 from __future__ import annotations
@@ -21,11 +26,12 @@ TIMES = np.geomspace(0.003, 1e4, 8)  # of the branches [s]
 DECADES = np.log10(TIMES[1] / TIMES[0])  # from one to the next
 LATER = 10.0  # s after a sudden stretch
 JOIN = 0.05  # as in rubber.h
+FLOW_POWER = 3  # of |o/E|, by which the rate grows; as in rubber.h
 
 
 def memories(law: str) -> int:
-    """Numbers that each edge remembers: branches, and three that the steps keep beside them."""
-    return len(TIMES) + 3 if law == RUBBER else 0
+    """Numbers that each edge remembers: of the branches, flow, and three that steps keep beside."""
+    return len(TIMES) + 1 + 3 if law == RUBBER else 0
 
 
 def relaxed(relaxation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -76,3 +82,28 @@ def overstress(stress: np.ndarray, step: float) -> np.ndarray:
     for change in np.moveaxis(np.diff(stress, axis=-1), -1, 0):
         result = forget * result + follow * change[..., None]
     return result
+
+
+def flowing(stress: np.ndarray, step: float, pause: float, rate: np.ndarray | float) -> np.ndarray:
+    """What the flowing branch carries after a history that starts relaxed, and a pause.
+
+    Args:
+        stress: p over the shear modulus, at equal steps, shape (..., T).
+        step, pause: [s].
+        rate: Of the flow [1/s], one or one a history (...).
+
+    Returns:
+        Shape (...), over the shear modulus; times `flow` it adds to the stress.
+    """
+    result = np.zeros(stress.shape[:-1])
+    for change in np.moveaxis(np.diff(stress, axis=-1), -1, 0):
+        result = flowed(result, step, rate) + change
+    return flowed(result, pause, rate)
+
+
+def flowed(
+    overstress: np.ndarray | float, time: float, rate: np.ndarray | float
+) -> np.ndarray | float:
+    """What is left of an overstress, over the shear modulus, that flows for a time [s]: exactly."""
+    passed = FLOW_POWER * time * rate * np.abs(overstress / 3) ** FLOW_POWER
+    return overstress * (1 + passed) ** (-1 / FLOW_POWER)

@@ -115,6 +115,8 @@ def test_says_the_pull_and_pause_that_rubber_takes_for_granted(root) -> None:
         "upturn": 0.0,
         "softening": 0.0,
         "relaxation": 0.02,
+        "flow": 0.1,
+        "log_flow_rate": 2.0,
     }
     history = {"pull_time": 4.0, "pause": 2.0}
     rubber = {"band": "toy", "law": "rubber", "theta": theta, "history": history}

@@ -12,6 +12,7 @@ import pytest
 
 from app import __version__, cli
 from app.command_line import COMMANDS, EXITS
+from pipeline.params.identification import LAWS
 from pipeline.simulator.parameters import THETA
 from tests.policy.linear import write_policy
 from tests.project import DEFAULTS, ROOT, python
@@ -250,7 +251,7 @@ def test_launch_prints_one_json_object(tmp_path: Path, sling: Callable) -> None:
     broken = json.loads(done.stdout)
     assert broken["landing_y_m"] is None
     assert "N, more than" in broken["failure"]
-    more = {"mooney_share": 0.3, "upturn": 0.0, "softening": 0.0, "relaxation": 0.02}
+    more = dict(zip(LAWS["rubber"], (0.3, 0.0, 0.0, 0.02, 0.1, 2.0), strict=True))
     history = {"pull_time": 3.5, "pause": 2.0}
     rubber = {"band": "band1", "law": "rubber", "theta": SOFT | more, "history": history}
     theta.write_text(json.dumps(rubber))

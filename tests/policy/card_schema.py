@@ -45,6 +45,8 @@ RUBBER = {
     "upturn": NOT_NEGATIVE,
     "softening": NOT_NEGATIVE,
     "relaxation": NOT_NEGATIVE,
+    "flow": NOT_NEGATIVE,
+    "log_flow_rate": NUMBER,
 }
 SECOND = {"type": ["number", "null"]}
 HAND = exactly(pull_time_s=POSITIVE, pause_s=NOT_NEGATIVE, second_more_m=SECOND)

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.simulator import launch
 from pipeline.simulator.initial import drawn_guess
-from pipeline.simulator.launch import schedule_of, unrelaxed
+from pipeline.simulator.launch import memory_of_pull, schedule_of
 from pipeline.simulator.model import LaunchHistory
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import RUBBER
@@ -29,7 +29,7 @@ def held(sling, setup, parameters, draws):
         parameters,
         guess,
         payload=setup.projectile_mass,
-        unrelaxed=unrelaxed(sling, setup.history, parameters, draws),
+        **memory_of_pull(sling, setup.history, parameters, draws),
     )
     done = run(sling, schedule, slings, options=Options(double=True))
     assert not done.lanes["outcome"].any()

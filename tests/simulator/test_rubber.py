@@ -7,14 +7,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from pipeline.base.errors import UserError
 from pipeline.episode.pull import launch_history
 from pipeline.simulator import interact, launch
-from pipeline.simulator.launch import unrelaxed
+from pipeline.simulator.launch import memory_of_pull
 from pipeline.simulator.model import LaunchHistory
 from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.rubber import RUBBER, TIMES, overstress, update
+from pipeline.simulator.rubber import RUBBER, TIMES, flowed, overstress, update
 from rig.physics.motion import pull_history
 from tests.simulator.bands import neo
 
@@ -25,6 +26,11 @@ DRAW = np.array([-0.35, -0.15])
 def gum(**others: float | np.ndarray) -> Parameters:
     """THETA, and what the law has of its own."""
     return Parameters.of(RUBBER, THETA, **others)
+
+
+def unrelaxed(band, history: LaunchHistory, draws: np.ndarray) -> np.ndarray:
+    """What the branches that relax carry after a pull, shape (N, 8)."""
+    return memory_of_pull(band, history, gum(), draws)["unrelaxed"]
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +69,21 @@ def test_each_parameter_has_its_effect(rubber, launch_setup):
     assert later.speed < 0.995 * fresh.speed
 
 
+def test_flow_has_its_share_and_its_rate(rubber, launch_setup):
+    """A share that hardly flows is a stiffer band; at once, none; between, work is lost."""
+    setup = replace(launch_setup, history=LaunchHistory(4.0, 2.0))
+    plain, stiffer = (launch(rubber, setup, gum(mooney_share=0.0), DRAW), gum().values.copy())
+    stiffer[:, 0] *= 1.3
+    stiff = launch(rubber, setup, Parameters(RUBBER, stiffer), DRAW)
+    rates = np.array([-10.0, 1.0, 3.0, 12.0])
+    done = launch(rubber, setup, gum(flow=0.3, log_flow_rate=rates), DRAW)
+    assert done.hold_force[0] == pytest.approx(stiff.hold_force[0], rel=5e-3)
+    assert np.all(np.diff(done.hold_force) < 0) and done.hold_force[-1] > plain.hold_force
+    assert done.hold_force[-1] == pytest.approx(plain.hold_force[0], rel=2e-3)
+    per_force = done.speed**2 / done.hold_force  # of equally strong bands, what returns
+    assert per_force[2] < 0.97 * per_force[0]
+
+
 def test_softening_takes_from_what_was_stretched(rubber, launch_setup):
     """A first draw is virgin and returns less; a draw below an earlier stretch is held by less."""
     plain, first = (launch(rubber, launch_setup, gum(softening=s), DRAW) for s in (0.0, 0.4))
@@ -93,6 +114,8 @@ def test_every_theta_may_have_its_own_parameters(rubber, launch_setup):
         "upturn": np.array([0.0, 0.1, 0.2]),
         "softening": np.array([0.3, 0.0, 0.1]),
         "relaxation": np.array([0.0, 0.01, 0.03]),
+        "flow": np.array([0.2, 0.0, 0.1]),
+        "log_flow_rate": np.array([2.0, 0.0, 3.0]),
     }
     history = LaunchHistory(2.0, 1.0)
     many = gum(**parameters)
@@ -109,7 +132,7 @@ def test_every_theta_may_have_its_own_parameters(rubber, launch_setup):
 
 def test_memory_of_a_pull_is_that_of_short_steps_and_fades(rubber):
     drawn = np.array([[-0.40, 0.0]])
-    carried = unrelaxed(rubber, LaunchHistory(4.0, 2.0), gum(), drawn)[0]
+    carried = unrelaxed(rubber, LaunchHistory(4.0, 2.0), drawn)[0]
     step = 1e-3  # Euler's method on o' = p' - o/t
     part = np.clip(np.arange(0, 6, step) / 4, 0, 1)
     depth = 0.4 * part**2 * (3 - 2 * part)
@@ -120,9 +143,43 @@ def test_memory_of_a_pull_is_that_of_short_steps_and_fades(rubber):
         summary += change - step * summary / TIMES
     np.testing.assert_allclose(carried, summary / stress[-1], atol=2e-3)
     assert np.all(np.diff(carried) >= -1e-12)  # slow branches keep more
-    assert unrelaxed(rubber, LaunchHistory(4.0, 1e6), gum(), drawn).max() < 1e-6
+    assert unrelaxed(rubber, LaunchHistory(4.0, 1e6), drawn).max() < 1e-6
     slack = np.array([[-0.01, 0.0]])
-    assert unrelaxed(rubber, LaunchHistory(4.0, 0.0), gum(), slack).max() == 0
+    assert unrelaxed(rubber, LaunchHistory(4.0, 0.0), slack).max() == 0
+
+
+@pytest.mark.parametrize(("share", "rate"), [(0.0, 2.0), (0.5, 3.5)])
+def test_flow_of_a_pull_is_that_of_an_integration(rubber, share, rate):
+    """By another library: o' = p' - r |o/E|^3 o over the pull and the pause."""
+    drawn, pull_time, pause = np.array([[-0.40, 0.0]]), 4.0, 2.0
+    parameters = gum(mooney_share=share, flow=0.2, log_flow_rate=rate)
+    history = LaunchHistory(pull_time, pause)
+    carried = memory_of_pull(rubber, history, parameters, drawn)["unflowed"][0]
+
+    def stress(time: float) -> float:
+        part = min(time / pull_time, 1)
+        depth = 0.4 * part**2 * (3 - 2 * part)
+        stretch = max(2 * np.hypot(rubber.half_width, depth) / rubber.rest_length, 1)
+        return (stretch - stretch**-2) * (1 - share + share / stretch)
+
+    def change(time: float, o: np.ndarray) -> np.ndarray:
+        rise = (stress(time + 1e-6) - stress(time - 1e-6)) / 2e-6
+        return rise - 10**rate * np.abs(o / 3) ** 3 * o
+
+    done = solve_ivp(change, (0, pull_time + pause), [0.0], "LSODA", rtol=1e-8, max_step=0.02)
+    assert carried == pytest.approx(done.y[0, -1] / stress(pull_time), rel=5e-3)
+    assert not memory_of_pull(rubber, None, parameters, drawn)["unflowed"].any()
+
+
+def test_flowing_on_is_flowing_longer():
+    """Exact, whatever the parts are; and implicit Euler's step comes to it as steps are short."""
+    o, rate = np.array([0.5, -2.0, 0.0]), 300.0
+    np.testing.assert_allclose(flowed(flowed(o, 0.3, rate), 0.7, rate), flowed(o, 1.0, rate))
+    for count, allowed in ((100, 0.1), (10_000, 1e-3)):
+        left = o
+        for _ in range(count):
+            left = left / (1 + rate / count * np.abs(left / 3) ** 3)
+        np.testing.assert_allclose(left, flowed(o, 1.0, rate), rtol=allowed)
 
 
 def test_updates_are_exact_for_straight_histories():
@@ -164,7 +221,7 @@ def test_a_pause_fades_the_memory_by_its_own_length(rubber):
     """Whatever the pull's: exp(-pause / t) of what it left."""
     for pull_time in (0.05, 4.0, 100.0):
         none, some = (
-            unrelaxed(rubber, LaunchHistory(pull_time, pause), gum(), DRAW[None])[0]
+            unrelaxed(rubber, LaunchHistory(pull_time, pause), DRAW[None])[0]
             for pause in (0.0, 0.7)
         )
         np.testing.assert_allclose(some, none * np.exp(-0.7 / TIMES), rtol=1e-12)

@@ -8,6 +8,7 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.identify.results.theta import content_of, load_samples, load_theta, parameters_of
+from pipeline.params.identification import LAWS
 from pipeline.simulator.model import LaunchHistory
 from pipeline.simulator.parameters import THETA, Parameters
 
@@ -61,14 +62,14 @@ def test_the_drag_comes_back(tmp_path: Path) -> None:
 def test_the_law_rubber_names_its_parameters(tmp_path: Path) -> None:
     file, rubber = (
         tmp_path / "theta.json",
-        {"mooney_share": 0.3, "upturn": 0.0, "softening": 0.1, "relaxation": 0.02},
+        dict(zip(LAWS["rubber"], (0.3, 0.0, 0.1, 0.02, 0.2, 2.5), strict=True)),
     )
     history = {"pull_time": 4.0, "pause": 2.0, "deepest": 0.3}
     whole = {"band": "red", "law": "rubber", "theta": SOFT | rubber, "history": history}
     file.write_text(json.dumps(whole))
     content = load_theta(file, "red")
     parameters = parameters_of(content)
-    assert parameters.values.tolist() == [[*SOFT.values(), 0.3, 0.0, 0.1, 0.02, 0.0, 0.0, 1.0]]
+    assert parameters.values.tolist() == [[*SOFT.values(), *rubber.values(), 0.0, 0.0, 1.0]]
     assert parameters.theta.tolist() == [list(SOFT.values())]
     written = content_of(parameters, LaunchHistory(**history))
     assert (written["law"], written["theta"], written["history"]) == (

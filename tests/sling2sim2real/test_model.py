@@ -10,6 +10,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.identify.results.theta import load_theta
 from pipeline.launching.surface.simulator import simulator
+from pipeline.params.identification import LAWS
 from sling2sim2real import Band, LaunchHistory, Model, Mounting, Settings, Theta
 from sling2sim2real.model import with_band
 
@@ -52,7 +53,7 @@ def test_points_of_their_own(world) -> None:
 
 
 @pytest.mark.parametrize(
-    "rubber", [{}, {"mooney_share": 0.2, "upturn": 0.1, "softening": 0.2, "relaxation": 0.01}]
+    "rubber", [{}, dict(zip(LAWS["rubber"], (0.2, 0.1, 0.2, 0.01, 0.1, 2.0), strict=True))]
 )
 def test_theta_is_read_as_it_is_written(tmp_path, rubber) -> None:
     theta = Theta(2e5, 0.47, 2.4e-3, 0.7, 0.6, **rubber, **EXTRA)

@@ -29,7 +29,7 @@ def test_theta_and_unit_cube_go_with_each_other(world, episode) -> None:
     assert objective.theta(objective.unit(world.theta)).law == "rubber"
     back = objective.theta(objective.unit(world.theta))
     assert np.allclose(back.point, world.theta.point)
-    assert objective.theta(np.ones(len(objective.names))).relaxation == objective.high[-1]
+    assert objective.theta(np.ones(len(objective.names))).log_flow_rate == objective.high[-1]
 
 
 def test_a_loss_of_ones_own(world, episode) -> None:

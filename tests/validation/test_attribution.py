@@ -42,6 +42,7 @@ def test_every_variant_is_a_method_or_a_change_of_ours() -> None:
     others = METHODS.keys() - methods.keys()
     assert others == {"later_pictures", "recoil_trusted_half"}
     assert methods["no_softening"].fixed == {**methods[OURS].fixed, "softening": 0.0}
+    assert methods["no_flow"].fixed["flow"] == 0.0
 
 
 def test_later_pictures_of_a_recoil_count_within_the_block_alone(episode) -> None:

@@ -49,6 +49,7 @@ METHODS = {  # and the words of the table
     "density_neo_hookean": "our density, neo-Hookean",
     OURS: "our density, law `rubber`: the default",
     "no_softening": "… without softening",
+    "no_flow": "… without flow",
     "prior_half": "… priors half as wide",
     "prior_twice": "… priors twice as wide",
     "prior_loss_up": "… loss factor expected 40 % higher",

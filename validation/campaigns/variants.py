@@ -38,7 +38,7 @@ PRIOR_CHANGES = {
     "prior_loss_up": (1.0, 1.4),
     "prior_loss_down": (1.0, 0.6),
 }
-LAW_CHANGES = "search_rubber", "density_neo_hookean", "no_softening"
+LAW_CHANGES = "search_rubber", "density_neo_hookean", "no_softening", "no_flow"
 BESIDE = {*SETTINGS, *WEIGHTS, *PRIOR_CHANGES, *LAW_CHANGES}  # what no campaign runs unasked
 # Gaussian processes of thousands of points cost more than the simulations: a large budget is less.
 BAYES, BAYES_LARGE = (
@@ -71,13 +71,18 @@ def with_variants(params: Params) -> Params:
     methods |= dict.fromkeys(SETTINGS, paper)
     density = params.methods[OURS]
     methods |= dict.fromkeys(PRIOR_CHANGES, density)
+
+    def without(**values: float):
+        return density.model_copy(update={"fixed": {**density.fixed, **values}})
+
     rubber, plain = (
         {"law": method.law, "bounds": method.bounds} for method in (density, methods[PAPER])
     )
     methods |= {
         "search_rubber": methods[PAPER].model_copy(update=rubber),
         "density_neo_hookean": density.model_copy(update=plain),
-        "no_softening": density.model_copy(update={"fixed": {**density.fixed, "softening": 0.0}}),
+        "no_softening": without(softening=0.0),
+        "no_flow": without(flow=0.0, log_flow_rate=0.0),
     }
     return params.model_copy(update={"methods": methods})
 

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 
 from pipeline.simulator.material import material
 from pipeline.simulator.model import ClampedBand
@@ -154,3 +154,18 @@ def integral(
     corners = [corner for corner in (0.2, 0.5) if corner < time]
     added = quad(kernel, 0, time, points=corners, limit=400, epsabs=1e-7)[0]
     return left * (stress(history(time), shape) + weight * added)
+
+
+def flow_integral(
+    history: Callable, times: np.ndarray, shape: tuple[float, float], flow: float, rate: float
+) -> np.ndarray:
+    """Stress of a string that flows, at rising times (T,): o' = p' - r |o/E|^3 o, by LSODA."""
+    step = 1e-6
+
+    def change(then: float, o: np.ndarray) -> np.ndarray:
+        rise = stress(history(then + step), shape) - stress(history(then - step), shape)
+        return rise / (2 * step) - rate * np.abs(o / 3) ** 3 * o
+
+    accurate = {"method": "LSODA", "rtol": 1e-7, "atol": 1e-9, "max_step": 1e-3}  # at corners too
+    done = solve_ivp(change, (0, times[-1]), [0.0], t_eval=times, **accurate)
+    return stress(history(times), shape) + flow * done.y[0]

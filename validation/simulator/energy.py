@@ -93,21 +93,23 @@ def remembered(
     """Memory of states (S, L, 9) after steps from `start`, relaxed; steps at rest forget all."""
     columns = rod.columns(np.concatenate([start[None], x]))
     stress, done = rod.uniaxial(rod.stretch(columns)), rod.pulled(rod.stretch(columns))
-    weight, carried = rod.branch, np.zeros((len(x), rod.sling.edges))
-    overstress = np.zeros((len(x) + 1, rod.sling.edges, table["forget"].shape[1]))
+    weights, carried = rod.branches, np.zeros((len(x), rod.sling.edges))
+    overstress = np.zeros((len(x) + 1, rod.sling.edges, len(weights)))
+    following = np.zeros((len(x), 1))
     moving = table["mode"] == Mode.MOVE
     worst = np.empty((len(x) + 1, rod.sling.edges))
     worst[0] = rod.worst
     for k, goes_on in enumerate(moving):
         worst[k + 1] = np.maximum(worst[k] if goes_on else rod.worst, done[k + 1])
-    follow = np.where(moving[:, None], table["follow"], 0.0)
     for k in np.flatnonzero(moving):
-        retained = table["forget"][k] * overstress[k]
-        carried[k] = weight * (retained - np.outer(stress[k], follow[k])).sum(-1)
-        overstress[k + 1] = retained + np.outer(stress[k + 1] - stress[k], follow[k])
-    free, power = rod.branches(overstress, columns)
+        forget, follow = rod.update(table[k], overstress[k])
+        retained = forget * overstress[k]
+        carried[k] = (retained - np.outer(stress[k], follow)) @ weights
+        following[k] = follow @ weights
+        overstress[k + 1] = retained + np.outer(stress[k + 1] - stress[k], follow)
+    free, power = rod.remembered(overstress, columns)
     lost = np.where(moving, table["h"] * (power[1:] + power[:-1]) / 2, 0.0)
-    return Remembered(carried, weight * follow.sum(-1)[:, None], worst, free[1:], lost)
+    return Remembered(carried, following, worst, free[1:], lost)
 
 
 def balance(

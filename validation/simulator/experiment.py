@@ -85,11 +85,12 @@ def settling(grip: Grip = Grip.FREE, target=(0.0, 0.0, 0.0)) -> np.ndarray:
 def move(
     bench: Bench, sling: ClampedBand, parameters: Parameters, table: np.ndarray,
     start: np.ndarray, *,
-    payload: float = 0.0, unrelaxed=0.0, **options,
+    payload: float = 0.0, unrelaxed: float = 0.0, **options,
 ) -> Trajectories:  # fmt: skip
     """Step N parameters from `start` (N, L, 9) or (L, 9), at rest, through steps (S,).
 
-    Other options are those of the solver.
+    The law's branches begin with a share `unrelaxed` of the stress at rest; other options are those
+    of the solver.
     """
     start = np.array(start, float)
     start[..., -1, 3:] = fixed_frames(sling)[1].ravel()  # the last clamp's, whatever was before
@@ -97,7 +98,9 @@ def move(
     done = run(
         sling,
         Schedule(table, first_free=count),
-        Slings.of(sling, parameters, start, payload=payload, unrelaxed=unrelaxed),
+        Slings.of(
+            sling, parameters, start, payload=payload, unrelaxed=unrelaxed, unflowed=unrelaxed
+        ),
         Frames(np.arange(count), np.ones(count), width=9),
         Options(bench.device, bench.workers, **options),
     )

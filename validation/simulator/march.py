@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.simulator.records import Grip, Mode
-from pipeline.simulator.rubber import TIMES
 from validation.simulator.reference import ReferenceRod
 
 SMALL = 1e-30  # imaginary step: derivatives without cancellation
@@ -31,7 +30,7 @@ class Driven:
 @dataclass(frozen=True)
 class March:
     """States x and rates v after each step, shape (S, L, 9), the force on the hand (S, 3), and
-    what the branches of the law `rubber` carry (S, E, 8) [Pa].
+    what the branches of the law `rubber` carry (S, E, 9) [Pa].
     """
 
     x: np.ndarray
@@ -47,7 +46,7 @@ def march(
     *,
     friction: float = np.inf,
     direction=(0, 0, 0),
-    unrelaxed=np.zeros(len(TIMES)),  # noqa: B008 (nobody writes it)
+    unrelaxed: float | np.ndarray = 0.0,
     driven: Driven | None = None,
     exact: float = 1e-11,
 ) -> March:
@@ -56,31 +55,32 @@ def march(
     Args:
         friction: 2 times the coefficient of friction: with the normal force what two pads can hold.
         direction: Of the pull that opening pads resist, until a held step says, shape (3,).
-        unrelaxed: What share of a stress at rest the branches carry besides, shape (8,).
+        unrelaxed: What share of a stress at rest the branches carry besides: one, or each (9,).
         exact: Newton's change below which a step is done [m].
     """
-    middle, weight = rod.sling.middle, rod.branch
+    middle, weights = rod.sling.middle, rod.branches
+    at_rest = np.broadcast_to(unrelaxed, len(weights))
     x1 = x2 = np.array(start, float)
     v1 = v2 = np.zeros_like(x1) if driven is None else driven.rates
     drag = rod.value("air_drag") * replace(rod, payload=0.0).mass
     drag[:, 3:] = 0
     offset, pull, direction = None, 0.0, np.asarray(direction, float)
     xs, vs, forces, carried = [], [], [], []
-    overstress = np.zeros((rod.sling.edges, len(TIMES)))
+    overstress = np.zeros((rod.sling.edges, len(weights)))
     stress = rod.uniaxial(rod.stretch(rod.columns(x1)))  # at the last step's end
     worst = np.broadcast_to(rod.worst, rod.sling.edges)
     for number, step in enumerate(steps):
         h, past, grip, target = (step[name] for name in ("h", "past", "grip", "target"))
         bh = step["beta"] * h
-        forget, follow = step["forget"], step["follow"]
-        if step["mode"] == Mode.RELAX:  # from rest, whatever was before
-            forget, follow, overstress, stress = 0.0, unrelaxed, 0 * overstress, 0 * stress
+        relax = step["mode"] == Mode.RELAX  # from rest, whatever was before
+        forget, follow = rod.update(step, overstress, at_rest if relax else None)
+        stress = 0 * stress if relax else stress
         band = replace(
             rod,
             share=step["bending"],
             gripped=grip == Grip.HELD,
-            carried=weight * (forget * overstress - np.outer(stress, follow)).sum(-1),
-            following=weight * np.sum(follow),
+            carried=(forget * overstress - np.outer(stress, follow)) @ weights,
+            following=float(follow @ weights),
             worst=worst,
         )
         free = _free(band)
@@ -116,14 +116,14 @@ def march(
         if grip in (Grip.FREE, Grip.OPENING):
             force = capacity * direction
         v = (x - y) / bh
-        if step["mode"] == Mode.RELAX:
+        if relax:
             x1, x2, v1, v2 = x, x, 0 * v, 0 * v
         else:
             x1, x2, v1, v2 = x, x1, v, v1
         stretch = rod.stretch(rod.columns(x))
         change, stress = -stress, rod.uniaxial(stretch)
         overstress = forget * overstress + np.outer(stress + change, follow)
-        worst = np.maximum(rod.worst if step["mode"] == Mode.RELAX else worst, rod.pulled(stretch))
+        worst = np.maximum(rod.worst if relax else worst, rod.pulled(stretch))
         xs.append(x), vs.append(v1), forces.append(force), carried.append(overstress)
     return March(*map(np.array, (xs, vs, forces, carried)))
 

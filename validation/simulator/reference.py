@@ -27,6 +27,7 @@ HOLDS, TAUT = (
     1e-4,
     1.2,
 )  # s d that brakes turns of a slack edge [s]; the stretch from which it is taut
+FLOW_POWER = 3  # of |o/E|, by which its rate grows
 STRAIGHT = 0.7  # stretch below which the law `rubber` is a straight line
 
 
@@ -96,10 +97,34 @@ class ReferenceRod:
         return self._values.get(name, 0.0)
 
     @cached_property
-    def branch(self) -> float:
-        """Weight of each, over what never relaxes."""
+    def branches(self) -> np.ndarray:
+        """Weight of each over what never relaxes, shape (9,): those that relax, and what flows."""
         left, weight = relaxed(self.value("relaxation"))
-        return float(weight / left)
+        return np.append(np.full(len(TIMES), weight), self.value("flow")) / left
+
+    def fading(self, overstress: np.ndarray) -> np.ndarray:
+        """Rates at which branches forget an overstress (..., E, 9) [Pa], the same shape [1/s]."""
+        strain = np.abs(overstress[..., -1:]) / (3 * self.parameters[0])
+        flow = 10 ** self.value("log_flow_rate") * strain**FLOW_POWER
+        times = np.broadcast_to(1 / TIMES, (*overstress.shape[:-1], len(TIMES)))
+        return np.concatenate([times, flow], axis=-1)
+
+    def update(
+        self, step: np.void, overstress: np.ndarray, unrelaxed: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What branches keep of their overstress (E, 9) [Pa] over a step, and take of p's change.
+
+        Args:
+            unrelaxed: Of a step that begins from rest: the share (9,) of its stress that they take.
+
+        Returns:
+            Shapes (E, 9) and (9,).
+        """
+        if unrelaxed is not None:
+            return 0 * overstress, unrelaxed
+        flow = 1 / (1 + step["h"] * self.fading(overstress)[:, -1:])
+        forget = np.broadcast_to(step["forget"], (len(flow), len(TIMES)))
+        return np.hstack([forget, flow]), np.append(step["follow"], 1.0)
 
     # ---- edges
 
@@ -187,16 +212,16 @@ class ReferenceRod:
             low, high = np.where(above, low, middle), np.where(above, middle, high)
         return (low + high) / 2
 
-    def branches(self, overstress: np.ndarray, columns: np.ndarray) -> tuple[float, float]:
-        """Free energy [J] of branches with overstress (..., E, 8), and the power they lose [W]."""
+    def remembered(self, overstress: np.ndarray, columns: np.ndarray) -> tuple[float, float]:
+        """Free energy [J] of branches with overstress (..., E, 9), and the power they lose [W]."""
         stretch = self.stretch(columns)[..., None]
         stress = self.uniaxial(stretch)
         retained = stress - overstress
         q = self.stretch_at(retained)
         free = self.uniaxial(stretch, -1) - self.uniaxial(q, -1) - retained * (stretch - q)
-        lost = overstress * (stretch - q) / TIMES
-        volume = self.branch * self.sling.area * self.sling.edge_lengths
-        return tuple((density.sum(-1) * volume).sum(-1) for density in (free, lost))
+        lost = overstress * (stretch - q) * self.fading(overstress)
+        volume = self.sling.area * self.sling.edge_lengths
+        return tuple((density @ self.branches * volume).sum(-1) for density in (free, lost))
 
     def viscous_stress(self, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
         """d times the rate of the nominal stress at state `at`, shape part scaled by s, times A.

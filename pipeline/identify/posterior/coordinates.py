@@ -39,6 +39,8 @@ STEPS = {  # of finite differences
     "upturn": 0.01,
     "softening": 0.02,
     "relaxation": 0.004,
+    "flow": 0.01,
+    "log_flow_rate": 0.1,
     "air_drag": 0.25,
     "turn_damping": 0.5,
     "log_returned_share": 0.01,
@@ -50,9 +52,11 @@ TAN_DELTA = 0.05, 0.30
 MOST_DRAG, MOST_LOST = 8.0, 0.3  # 1/s, of a logarithm
 PRIORS = {  # mean and standard deviation of Gaussians
     "log_loss_factor": (np.log(np.sqrt(np.prod(TAN_DELTA)) / np.pi), np.log(6) / 2 / 1.645),
-    # a half-normal: slow cycles of elastomers return 64 to 82 % (10.5281/zenodo.14717689), and by
-    # softening alone 1 - 0.59 s
+    # half-normals: slow cycles of elastomers return 64 to 82 % (10.5281/zenodo.14717689), by
+    # softening alone 1 - 0.59 s, and by flow alone 1 - 2 flow or more
     "softening": (0.0, 0.3),
+    "flow": (0.0, 0.15),
+    "log_flow_rate": (2.0, 1.0),  # a stress of E/5 flows in a second, within a decade
     "air_drag": (0.0, 1.0),  # a half-normal: little beside the cylinder's drag
     "log_returned_share": (0.0, 0.015),  # the law's discrepancy, common to a band's launches
 }

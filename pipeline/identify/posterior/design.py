@@ -23,7 +23,7 @@ from pipeline.episode.episode import Episode
 from pipeline.episode.planned import leg_time, planned_pull
 from pipeline.episode.signal import average
 from pipeline.identify.posterior.coordinates import LOGS, Coordinates
-from pipeline.identify.posterior.gain import HALF_NORMAL
+from pipeline.identify.posterior.gain import HALF, HALF_NORMAL
 from pipeline.identify.posterior.likelihood import Tolerances
 from pipeline.identify.posterior.residuals import Rule
 from pipeline.params import Params
@@ -31,7 +31,7 @@ from pipeline.params.identification import LAWS
 from pipeline.params.lab import Dip
 from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.interaction import interact
-from pipeline.simulator.launch import launch
+from pipeline.simulator.launch import launch, memory_of_pull
 from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from pipeline.simulator.rubber import RUBBER, uniaxial
 
@@ -126,8 +126,8 @@ class PullDesign:
         rng = np.random.default_rng(params.optimizer.seed)
         phi, precision = drawn(coordinates, DRAWS, rng)
         young = coordinates.names.index(LOGS[0])
-        phi[:, young] = np.log(modulus(sling, coordinates, phi, draw, force))
         history = LaunchHistory(*times, deepest=float(np.hypot(*draw)))
+        phi[:, young] = np.log(modulus(sling, coordinates, phi, draw, force, history))
         setup = LaunchSetup.of(params.setup, params.sling, history)
         box = np.array([params.setup.draw_y, params.setup.draw_z])[:, ::-1].T  # shallow, deep
         land = _Landings(sling, setup, coordinates, box, workers)
@@ -209,8 +209,8 @@ def drawn(
     precision = coordinates.precision.copy()
     flat = precision == 0
     precision[flat] = 1 / (UNIFORM * (high - low)[flat] ** 2)
-    if "air_drag" in coordinates.names:
-        precision[coordinates.names.index("air_drag")] /= HALF_NORMAL
+    for name in {*HALF} & {*coordinates.names}:
+        precision[coordinates.names.index(name)] /= HALF_NORMAL
     return coordinates.quantiles(even), precision
 
 
@@ -220,12 +220,20 @@ def modulus(
     phi: np.ndarray,
     draw: tuple[float, float],
     force: float,
+    history: LaunchHistory,
 ) -> np.ndarray:
-    """Young's modulus [Pa] of which straight halves of shapes phi (N, D) hold `force` [N], (N,)."""
+    """Young's modulus [Pa] of which straight halves at phi (N, D) hold `force` [N], (N,).
+
+    After a pull and a pause, which leave some of the flow's stress.
+    """
     far = float(np.hypot(*draw))
     stretch, lean = float(sling.drawn(np.array(far))), far / np.hypot(far, sling.half_width)
     shape = (phi[:, coordinates.names.index(name)] for name in ("mooney_share", "upturn"))
-    return 3 * force / (2 * sling.area * lean * uniaxial(np.array(stretch), *shape))
+    parameters = coordinates.parameters(phi)
+    draws = np.broadcast_to(draw, (len(phi), 2))
+    flowing = memory_of_pull(sling, history, parameters, draws)["unflowed"]
+    pull = uniaxial(np.array(stretch), *shape) * (1 + parameters.column("flow") * flowing)
+    return 3 * force / (2 * sling.area * lean * pull)
 
 
 def eliminated(slopes: np.ndarray, force: np.ndarray, period: float) -> np.ndarray:

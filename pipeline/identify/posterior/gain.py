@@ -16,7 +16,7 @@ from pipeline.identify.posterior.coordinates import PRIORS
 
 LOGS = "youngs_modulus", "elasticity_damping", "returned_share"  # whose logarithms are Gaussian
 HALF_NORMAL = 1 - 2 / np.pi  # its variance, of a normal's
-HALF = "air_drag", "softening"  # are not below 0
+HALF = "air_drag", "softening", "flow"  # are not below 0
 LEAST = 1e-9  # of a column that the samples vary
 
 
@@ -107,11 +107,10 @@ class LandingModel:
     def _prior(self) -> np.ndarray:
         """Precision (D, D) of what is known without any pull; a bound tells as its own spread."""
         precision, place = np.zeros_like(self.covariance), self.names.index
-        directions = {  # of the coordinates' priors in the unknowns
+        # of the coordinates' priors in the unknowns
+        directions = {name: {name: 1.0} for name in PRIORS} | {
             "log_loss_factor": {"elasticity_damping": 1.0, "youngs_modulus": 0.5},
             "log_returned_share": {"returned_share": 1.0},
-            "softening": {"softening": 1.0},
-            "air_drag": {"air_drag": 1.0},
         }
         for name, parts in directions.items():
             if not set(parts) <= set(self.names):

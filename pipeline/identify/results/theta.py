@@ -52,6 +52,8 @@ class ThetaValues(Section):
     upturn: Annotated[float, Range(*LAWS[RUBBER]["upturn"])] = 0.0
     softening: Annotated[float, Range(*LAWS[RUBBER]["softening"])] = 0.0
     relaxation: Annotated[float, Range(*LAWS[RUBBER]["relaxation"])] = 0.0
+    flow: Annotated[float, Range(*LAWS[RUBBER]["flow"])] = 0.0
+    log_flow_rate: Annotated[float, Range(*LAWS[RUBBER]["log_flow_rate"])] = 0.0
 
 
 class Nuisances(Section):

@@ -8,6 +8,7 @@ from hypothesis.extra.numpy import arrays
 
 from pipeline.identify.objective.box import SearchBox, reflect
 from pipeline.params import load
+from pipeline.params.identification import LAWS
 from pipeline.simulator.parameters import THETA
 from tests.project import DEFAULTS
 
@@ -35,18 +36,19 @@ def test_scales() -> None:
 def test_what_a_law_adds_are_the_last_axes() -> None:
     """In one order, whatever that of the bounds; linear, between them."""
     bounds = {
+        "log_flow_rate": (0.0, 5.0),
         "softening": (0.0, 0.6),
+        "flow": (0.0, 0.5),
         "relaxation": (0.0, 0.05),
         "upturn": (0.0, 0.3),
         "mooney_share": (-0.3, 0.9),
     }
     box = SearchBox.of(load(DEFAULTS).parameters, bounds, "rubber")
-    assert box.names == (*THETA, "mooney_share", "upturn", "softening", "relaxation")
-    assert box.dimension == 9
-    theta = box.to_physical(np.full(9, 0.5))
+    assert box.names == (*THETA, *LAWS["rubber"]) and box.dimension == 11
+    theta = box.to_physical(np.full(11, 0.5))
     np.testing.assert_array_equal(theta[:5], BOX.to_physical(np.full(5, 0.5)))
-    np.testing.assert_allclose(theta[5:], [0.3, 0.15, 0.3, 0.025], atol=1e-15)
-    np.testing.assert_allclose(box.to_unit(theta), np.full(9, 0.5))
+    np.testing.assert_allclose(theta[5:], [0.3, 0.15, 0.3, 0.025, 0.25, 2.5], atol=1e-15)
+    np.testing.assert_allclose(box.to_unit(theta), np.full(11, 0.5))
 
 
 @given(arrays(float, (3, 5), elements=st.floats(-1e6, 1e6)))

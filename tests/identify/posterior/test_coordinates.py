@@ -14,7 +14,7 @@ from pipeline.identify.posterior.coordinates import (
     TAN_DELTA,
     Coordinates,
 )
-from pipeline.params.identification import UNSEEN
+from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.simulator.parameters import EXTRA, Parameters
 from tests.identify.objective.pulls import PARAMS, sling_of
 
@@ -51,7 +51,7 @@ def test_the_loss_factor_is_what_a_wave_loses_along_the_band():
     assert np.log(young) == pytest.approx(named["log_youngs_modulus"])
     assert np.log(product * speed / SLING.rest_length) == pytest.approx(named["log_loss_factor"])
     assert np.log(values["returned_share"]) == pytest.approx(named["log_returned_share"])
-    same = "mooney_share", "upturn", "softening", "relaxation", "air_drag", "turn_damping"
+    same = *LAWS["rubber"], "air_drag", "turn_damping"
     assert [values[name] for name in same] == [named[name] for name in same]
     fixed = PARAMS.methods[METHOD].fixed
     assert {*UNSEEN} == {*fixed} and {name: values[name] for name in fixed} == fixed
@@ -61,9 +61,7 @@ def test_bounds_are_the_boxs_the_methods_and_what_is_possible():
     """The loss factor's are those of damping's box at E's two ends."""
     ends = dict(zip(OURS.names, zip(OURS.low, OURS.high, strict=True), strict=True))
     bounds = PARAMS.methods[METHOD].bounds
-    assert ends["mooney_share"] == bounds["mooney_share"]
-    assert ends["relaxation"] == bounds["relaxation"] and ends["upturn"] == bounds["upturn"]
-    assert ends["softening"] == bounds["softening"]
+    assert all(ends[name] == bounds[name] for name in LAWS["rubber"])
     assert ends["air_drag"] == (0.0, MOST_DRAG) and ends["turn_damping"] == (0.0, 1.0)
     assert ends["log_returned_share"] == (-MOST_LOST, MOST_LOST)
     box = PARAMS.parameters

@@ -32,13 +32,15 @@ THETA = {
     "upturn": 0.05,
     "softening": 0.0,
     "relaxation": 0.04,
+    "flow": 0.05,
+    "log_flow_rate": 2.0,
 }
 POINT = {**THETA, "air_drag": 0.3, "turn_damping": 0.2, "returned_share": 1.0}
 SPREAD = {"youngs_modulus": 0.02, "elasticity_damping": 0.3, "returned_share": 0.015}
 
 
 def samples() -> np.ndarray:
-    """Of θ: some of it known to so many per cent, shape (40, 10)."""
+    """Of θ: some of it known to so many per cent, shape (40, 14)."""
     rng = np.random.default_rng(1)
     columns = [
         value * np.exp(SPREAD.get(name, 0.0) * rng.standard_normal(40))

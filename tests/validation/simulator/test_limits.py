@@ -45,6 +45,7 @@ CHECKS = {
     "friction": five_parameters.friction,
     "rubber: a string's pull": lambda bench: rubber.pull(bench, (2.2,)),
     "rubber: relaxation": rubber.relaxation,
+    "rubber: flow": rubber.flow,
     "rubber: a heavy middle": rubber.oscillator,
     "rubber: the kernel's steps": lambda bench: agreement.checks(
         bench, 1, sling=rubber.rubber_of(bench), **rubber.law_parameters((-0.3, 0.2), 0.08)

@@ -60,7 +60,7 @@ class Release:
         hold: Mean force while held, sensor frame, bias included [N], shape (3,).
         noise: Standard deviation of one force sample along the pull [N].
         drop: How much the force fell [N].
-        slips: Other sudden drops of the force [s].
+        slips: Sudden drops of the force before the release [s].
         spread: Time from 9 to 3 tenths of the held force [s].
         filtered: It is more than rubber needs: a filter is between sensor and recording.
     """

@@ -187,7 +187,9 @@ class Likelihood:
     """Likelihood of the parameters of a band, by one recording.
 
     Attributes:
-        episode, sling, cutoff, tolerances: As given; the sling is that of this episode.
+        episode, cutoff: As given.
+        sling: As given, with the pads' opening time of this episode.
+        tolerances: By the episode's metadata, until `with_wider_tolerances`.
         moved: What was added to the camera's stamps before the fit [s].
     """
 

@@ -1,7 +1,8 @@
 """MCAP file to `Recording`: which topic is which, their signals on header stamps, checked.
 
-Everything comes sorted by header.stamp; log_time is when a message was received, which is late and
-jitters, and serves only to notice what is wrong with a stamp's clock (`clocks`).
+Everything comes sorted by header.stamp. log_time is when a message was received: it is late and
+jitters, so it only shows what is wrong with a stamp's clock and helps to mend it (`clocks`), or
+stands in for a gripper's stamps where there are none.
 """
 
 from __future__ import annotations

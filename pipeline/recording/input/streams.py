@@ -1,4 +1,4 @@
-"""One topic's messages to a `Stream`: read, put on one clock, sorted, and what was lost said.
+"""All topics' messages to `Stream`s: read, put on one clock, sorted, and what was lost said.
 
 A message is lost where it cannot be read, is not finite or absurdly large, has no stamp or one far
 from its neighbours', names another frame than the rest, has the stamp of another, or, of force and

@@ -45,11 +45,11 @@ def test_every_variant_is_a_method_or_a_change_of_ours() -> None:
 
 
 def test_later_pictures_of_a_recoil_count_within_the_block_alone(episode) -> None:
-    usual = Rule().frames(episode)
+    usual = Rule().pictures(episode)
     assert usual.tolist() == [0, 2]
     with recoil_of("later_pictures"):
-        assert Rule().frames(episode).tolist() == [0, 2, 3]
-    assert Rule().frames(episode).tolist() == usual.tolist()
+        assert Rule().pictures(episode).tolist() == [0, 2, 3]
+    assert Rule().pictures(episode).tolist() == usual.tolist()
 
 
 def test_a_recoil_is_trusted_half_within_the_block_alone(episode) -> None:

@@ -135,7 +135,7 @@ def recordings(orange: Path | None, pulls=("informative", "paper")) -> list[Band
 @contextmanager
 def recoil_of(method: str) -> Iterator[None]:
     """Change what the recoil counts, as a method's name says: less trust, or later pictures too."""
-    trusted, counted = Tolerances.of, Rule.frames
+    trusted, counted = Tolerances.of, Rule.pictures
 
     def doubled(episode: Episode) -> Tolerances:
         return replace(trusted(episode), way=2 * Tolerances.way)
@@ -145,7 +145,7 @@ def recoil_of(method: str) -> Iterator[None]:
 
     changes = {
         "recoil_trusted_half": (Tolerances, "of", doubled),
-        "later_pictures": (Rule, "frames", later),
+        "later_pictures": (Rule, "pictures", later),
     }
     with mock.patch.object(*changes[method]) if method in changes else nullcontext():
         yield

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ruamel.yaml.comments import CommentedMap
 
+from app.cluster.exchange import drop
 from app.command_line import say
 from app.flow.disk import expect_writable
 from app.params_file import edited
@@ -21,8 +22,8 @@ from pipeline.params import expect_known, load, parse
 def remove_band(name: str, agreed: Callable[[list[str]], bool], root: Path | str = ".") -> str:
     """Remove a recorded band from params.yaml, data/, reports/ and the checkpoints.
 
-    Killed, the same command goes on: params.yaml comes last. DVC's cache and dvc.lock keep what
-    they have, and it does no harm there: the same band brought in again is found in it.
+    Killed, the same command goes on: params.yaml comes last. Entries of its stages leave dvc.lock.
+    DVC's cache keeps what it has: the same band brought in again is found in it.
 
     Args:
         name: Of the band.
@@ -54,6 +55,7 @@ def remove_band(name: str, agreed: Callable[[list[str]], bool], root: Path | str
         raise UserError(f"{name}: is kept; with --yes nobody is asked")
     for file in files:
         shutil.rmtree(file) if file.is_dir() else file.unlink()
+    drop(root, lambda stage: stage.partition("@")[2].partition("-")[0] == name)
     write_text(path, text)
     return "\n".join([f"{name} removed:", *(f"  {line}" for line in lines)])
 

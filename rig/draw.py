@@ -17,7 +17,7 @@ STREAM = 7  # of the seed, apart from those of noise
 OF_LAUNCHES = ("projectile_drag",)
 
 
-def drawn(params: Params, band: str, *, launching: bool = False) -> Params:
+def sampled(params: Params, band: str, *, launching: bool = False) -> Params:
     """`params` with the numbers of a band's recording, or its launches, each within its range.
 
     Launches are of the rubber: bands that are `like` one another land alike.

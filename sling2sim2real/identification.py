@@ -17,7 +17,7 @@ from pipeline.base.schema import read_json
 from pipeline.episode.episode import Episode
 from pipeline.episode.pull import launch_history
 from pipeline.identify.clamps import ClampCalibration, calibrate_clamps
-from pipeline.identify.identify import identify as run_identification
+from pipeline.identify.identify import search_and_fit
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
@@ -228,7 +228,7 @@ def identify(
         values = {name: getattr(theta, name) or 0.0 for name in parameter_names(law)}
         nearest = Parameters.named(law, values)
         sling = _sling(band, settings, mounting)
-    density = run_identification(
+    density = search_and_fit(
         settings,
         METHOD,
         sling,

@@ -11,7 +11,7 @@ samples. Killed, it resumes from .checkpoints/. SLING_DEVICE and SLING_WORKERS s
 from __future__ import annotations
 
 from pipeline.base.layout import Layout, made
-from pipeline.identify.objective.session import load_episode, service
+from pipeline.identify.objective.session import load_episode, logging_evaluator
 from pipeline.identify.optimizers.cma.refine import refine
 from pipeline.identify.results.confidence_file import law_entries, save_confidence
 from pipeline.identify.search.evaluations import Evaluations
@@ -26,7 +26,7 @@ def main() -> None:
     regions, _ = load_regions(made(layout.clusters(band, method)))
     names = parameter_names(law)
     explored = Evaluations.load(method, names, made(layout.history(band, method)))
-    evaluate = service("cma", band, method, params, params.optimizer.cma_rollouts)
+    evaluate = logging_evaluator("cma", band, method, params, params.optimizer.cma_rollouts)
     refined = refine(params, method, regions, evaluate)
     explored.followed_by(refined).save(layout.evaluations(band, method))
     save_confidence(layout.confidence(band, method), band, law_entries(load_episode(band), law))

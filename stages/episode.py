@@ -16,7 +16,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder
 from pipeline.base.layout import Layout, NotMade
 from pipeline.recording.input.bag import once
-from pipeline.recording.stored import episodes_of, forget
+from pipeline.recording.stored import forget, load_or_build
 from stages.start import run, started
 
 
@@ -33,7 +33,7 @@ def main() -> None:
         )
     with replacing_folder(layout.episodes(band)) as folder:
         for path in recordings:
-            episodes, refused = episodes_of(path, band, params, layout)
+            episodes, refused = load_or_build(path, band, params, layout)
             for reason in refused:
                 print(f"warning: left out: {reason}", file=sys.stderr)
             for episode in episodes:

@@ -16,7 +16,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
 from pipeline.base.weight import READINGS, tension
-from rig.draw import drawn
+from rig.draw import sampled
 from rig.oracle.aim import least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.hanging import hanging_stretch
@@ -42,7 +42,7 @@ def main() -> None:
                 " setup.max_force, widen setup.draw_y and setup.draw_z, or move trials.targets",
                 file=sys.stderr,
             )
-    string = string_of(drawn(params, band, launching=True), band)
+    string = string_of(sampled(params, band, launching=True), band)
     content = {
         "band": band,
         "kind": "virtual",

@@ -11,7 +11,7 @@ SLING_WORKERS say where it runs.
 from __future__ import annotations
 
 from pipeline.base.layout import Layout
-from pipeline.identify.objective.session import service
+from pipeline.identify.objective.session import logging_evaluator
 from pipeline.identify.search.explore import explore, rollouts_of
 from stages.start import run, started
 
@@ -19,7 +19,7 @@ from stages.start import run, started
 def main() -> None:
     params, band, method = started("band", "method")
     rollouts = rollouts_of(params, method)
-    explored = explore(params, method, service("history", band, method, params, rollouts))
+    explored = explore(params, method, logging_evaluator("history", band, method, params, rollouts))
     explored.save(Layout().history(band, method))
 
 

@@ -3,7 +3,7 @@
     python -m stages.launches band1 sling2sim2real
 
 Reads the policy in data/policies/<band>/<method>/, and writes launches.parquet beside it: launches
-of equal number have the same errors, for every method and policy.
+of equal target and number have the same errors, for every method and policy.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ samples. Killed, it resumes from .checkpoints/. SLING_DEVICE and SLING_WORKERS s
 from __future__ import annotations
 
 from pipeline.base.layout import Layout
-from pipeline.identify.objective.session import load_episode, service
+from pipeline.identify.objective.session import load_episode, logging_evaluator
 from pipeline.identify.results.confidence_file import law_entries, save_confidence
 from pipeline.identify.search.explore import explore, rollouts_of
 from stages.start import run, started
@@ -20,7 +20,9 @@ from stages.start import run, started
 def main() -> None:
     params, band, method = started("band", "method")
     layout, rollouts = Layout(), rollouts_of(params, method)
-    evaluations = explore(params, method, service("search", band, method, params, rollouts))
+    evaluations = explore(
+        params, method, logging_evaluator("search", band, method, params, rollouts)
+    )
     evaluations.save(layout.evaluations(band, method))
     entries = law_entries(load_episode(band), params.methods[method].law)
     save_confidence(layout.confidence(band, method), band, entries)

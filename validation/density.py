@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
-from pipeline.identify.identify import identify
+from pipeline.identify.identify import search_and_fit
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import TERMS, EpisodeLoss
@@ -72,7 +72,7 @@ def calibrated_by(
     history = posterior.recorded_history(sling, episodes)
     setup = LaunchSetup.of(params.setup, params.sling, history)
     evidence = Evidence(observed, setup)
-    identified = identify(
+    identified = search_and_fit(
         params, method, sling, episodes, evaluate, evidence=evidence, workers=WORKERS
     )
     density = identified.density

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,7 @@ from pipeline.base.files import write_text
 
 # What DVC itself reads, whatever the stage, and code of every stage that DVC does not track.
 ALWAYS = ("dvc.yaml", "params.yaml", "pipeline/params", "stages/dvc_files.py", "stages/start.py")
+ENTRIES = re.compile(r"^(?=  \S)", re.MULTILINE)  # where those of dvc.lock begin
 
 
 def digests(root: Path, sources: Iterable[str]) -> dict[str, str]:
@@ -66,6 +68,20 @@ def merge(root: Path, new: Mapping[str, dict]) -> None:
         content = parse_yaml_for_update(_lock_text(root), "dvc.lock")
         content.setdefault("stages", {}).update(new)
         write_text(root / "dvc.lock", dumps_yaml(content))
+
+
+def drop(root: Path, gone: Callable[[str], bool]) -> None:
+    """Take the entries of some stages, by name, out of dvc.lock; as safely as `merge`."""
+    path = root / "dvc.lock"
+    if not path.is_file():
+        return
+    with locked(root):
+        head, *before = ENTRIES.split(_lock_text(root))
+        entries = [entry for entry in before if not gone(entry.strip().partition(":")[0])]
+        if not entries:
+            path.unlink()
+        elif len(entries) < len(before):
+            write_text(path, head + "".join(entries))
 
 
 def _lock_text(root: Path) -> str:

@@ -176,7 +176,7 @@ def _add_roles(topics: list[Topic], recording: Recording) -> None:
             longest_gap=stream.longest_gap,
             missing=stream.missing,
             lost=stream.lost,
-            delay=stream.delay,
-            clock_offset=recording.wrench.delay - stream.delay,
+            delay=stream.receipt_delay,
+            clock_offset=recording.wrench.receipt_delay - stream.receipt_delay,
             notes=list(stream.notes),
         )

@@ -21,7 +21,7 @@ from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.masks import masker
 from pipeline.recording.processed import Processed
-from pipeline.recording.view import Frame, Scene
+from pipeline.recording.view import RgbdFrame, Scene
 from pipeline.report.drawing.names import as_label
 from pipeline.report.drawing.styles import COLORS, INK, THEME
 
@@ -82,7 +82,7 @@ def draw_sheet(look: Look, params: Params, path: Path) -> str:
 
 def masked_frames(
     done: Processed, cloud: CloudParams, numbers: list[int] | None = None
-) -> Iterator[tuple[Frame, np.ndarray]]:
+) -> Iterator[tuple[RgbdFrame, np.ndarray]]:
     """These or all pictures of the window with their masks, by the backend of params.cloud."""
     mask = masker(cloud.mask, done.view, cloud.sam3)
     for _, frame in done.view.frames(numbers):

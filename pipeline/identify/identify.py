@@ -58,7 +58,7 @@ def evaluations_of(
     return explored.followed_by(refine(params, method, regions, evaluate))
 
 
-def identify(
+def search_and_fit(
     params: Params,
     method: str,
     sling: ClampedBand,

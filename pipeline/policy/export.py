@@ -38,7 +38,7 @@ def export(
     """Write a policy's files into `folder`: networks and curve, and last its card.
 
     Args:
-        params, band, method, theta, about: As `card` has them.
+        params, band, method, theta, more: As `card` has them.
     """
     with replacing(folder / "training.parquet") as temporary:
         pq.write_table(pa.table(trained.curve), temporary)
@@ -138,10 +138,10 @@ def card(
     Args:
         params: The whole of params.yaml.
         theta: Content of the theta file whose simulator the policy was trained in.
-        training: What check.py says of it; NaN becomes null.
+        training: What `check.figures` says of it; NaN becomes null.
         landing_map: How well the interpolated launches go with simulated ones
             (`landing_map.validation`).
-        launch: How the hand must draw the band (`landing.simulator.asked_of_the_hand`), where its
+        launch: How the hand must draw the band (`surface.simulator.asked_of_the_hand`), where its
             law remembers that.
         device: Where it was trained, "cpu" or "cuda".
     """

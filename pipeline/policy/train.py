@@ -134,6 +134,9 @@ def train(
 
     Runs on one thread with seeded generators: the same input gives the same network, bit for bit,
     on one machine.
+
+    Raises:
+        ValueError: if the surface gives NaN for a draw that it does not call failed.
     """
     with one_thread():
         torch.manual_seed(params.seed)

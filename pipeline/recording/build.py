@@ -115,7 +115,7 @@ def episode_of(done: Checked, band_name: str, params: Params) -> Episode:
             "topics": of_streams("topic"),
             "choices": recording.choices,
             "frames": geometry.sources,
-            "delays": of_streams("delay"),
+            "delays": of_streams("receipt_delay"),
             "lost": of_streams("lost"),
             "missing": of_streams("missing"),
             "losses": recording.losses,

@@ -15,7 +15,7 @@ from pipeline.base.machine import cores
 from pipeline.params.recording import CloudParams
 from pipeline.recording.blind import why_no_band
 from pipeline.recording.masks import masker
-from pipeline.recording.view import Frame, View
+from pipeline.recording.view import RgbdFrame, View
 
 ALONE = 0.2  # share of the points a band has within a radius: what has fewer is no band
 MOST_EMPTY = 0.5  # share of frames without any band
@@ -91,7 +91,7 @@ def clouds_of(view: View, cloud: CloudParams) -> Clouds:
     return clouds
 
 
-def cloud_of(view: View, frame: Frame, mask: np.ndarray, cloud: CloudParams) -> np.ndarray:
+def cloud_of(view: View, frame: RgbdFrame, mask: np.ndarray, cloud: CloudParams) -> np.ndarray:
     """Points of the pixels `found` (H, W), without outliers and sampled, (P, 3) float32."""
     if not mask.any():
         return np.zeros((0, 3), np.float32)

@@ -3,9 +3,11 @@
 | | seen in | good to |
 |---|---|---|
 | pose | the tool's inertia, where the sensor feels it | 1 ms |
-| pose, against the release | the hand that starts back when the band lets it go | 0.2 ms |
-| camera, against the pose | the hand in the pictures | 0.2 ms |
+| pose, against the release | the hand that starts back when the band lets it go | 0.1 ms |
+| camera, against the pose | the hand in the pictures | 0.1 ms |
 | camera | which picture is the first without the drawn band | a third of a picture's time |
+
+Where the hand starts back with a speed that jumps, its start is known to 1 ms only.
 
 Inertia and hand are looked for where the hand moves freely, or draws the band: the events are found
 first, with the stamps as they were recorded. That they are off by such a delay does no harm, for

@@ -16,7 +16,7 @@ from pipeline.recording.motion import interpolated
 Opening = tuple[np.ndarray, np.ndarray]  # of the gripper: times [s] and opening, both (G,)
 
 MARGIN = 0.05  # s kept clear of the grasp and of the release when means are taken
-LEAD_IN = 0.2  # s of the empty hand before the grasp, at least: the force is tared there
+LEAST_LEAD_IN = 0.2  # s of the empty hand before the grasp, at least: the force is tared there
 
 
 @dataclass(frozen=True)

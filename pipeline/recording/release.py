@@ -16,7 +16,7 @@ from scipy.signal import find_peaks
 
 from pipeline.base.errors import UserError
 from pipeline.recording.change import means, reach, sample_noise
-from pipeline.recording.grasp import LEAD_IN, Opening, fingers_closed, fingers_open
+from pipeline.recording.grasp import LEAST_LEAD_IN, Opening, fingers_closed, fingers_open
 
 SETTLE = 0.4  # s after the release until the hand is free and at rest
 RUBBER = 0.006  # s: pads open in less, and rubber follows them at once
@@ -60,7 +60,7 @@ class Release:
         hold: Mean force while held, sensor frame, bias included [N], shape (3,).
         noise: Standard deviation of one force sample along the pull [N].
         drop: How much the force fell [N].
-        slips: Other sudden drops of the force [s].
+        slips: Sudden drops of the force before the release [s].
         spread: Time from 9 to 3 tenths of the held force [s].
         filtered: It is more than rubber needs: a filter is between sensor and recording.
     """
@@ -211,7 +211,7 @@ class _Drops(NamedTuple):
         at = np.array([i for i in at if _median_step(force, i, far) > least], int)
         if not len(at):
             raise UserError(_no_drop(t, force, lasting[far:-far], size, far))
-        rest = force[t < t[0] + LEAD_IN].mean(axis=0)
+        rest = force[t < t[0] + LEAST_LEAD_IN].mean(axis=0)
         held, left = (np.linalg.norm(x[at] - rest, axis=1) for x in (before, after))
         freed = left < LIMITS.free * held
         opened = [i for i in at[freed] if gripper and fingers_open(*gripper, float(t[i]))]

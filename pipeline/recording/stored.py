@@ -33,7 +33,7 @@ def keep(path: Path, episodes: Sequence[Episode], params: Params, layout: Layout
                 episode.save(folder / str(number))
 
 
-def episodes_of(
+def load_or_build(
     path: Path, band: str, params: Params, layout: Layout
 ) -> tuple[list[Episode], list[UserError]]:
     """Return what `build_episodes` would, from what is stored where it still holds."""

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.base.errors import UserError
 from pipeline.params.lab import Tool
 from pipeline.recording.geometry import Geometry
-from pipeline.recording.grasp import LEAD_IN, MARGIN
+from pipeline.recording.grasp import LEAST_LEAD_IN, MARGIN
 from pipeline.recording.motion import Motion
 from pipeline.recording.release import SETTLE, Release
 from pipeline.recording.zero import Drift, drift_of
@@ -72,10 +72,10 @@ def band_force(
     lead_in, end = t < grasp - MARGIN, t > release.time + SETTLE
     if not held.any():
         raise UserError(f"no force in the half second before the release at {release.time:.3f} s")
-    if lead_in.sum() < 20 or grasp - MARGIN - t[0] < LEAD_IN:
+    if lead_in.sum() < 20 or grasp - MARGIN - t[0] < LEAST_LEAD_IN:
         raise UserError(
             f"the band is grasped {grasp - t[0]:.2f} s after the start: record at least"
-            f" {LEAD_IN + MARGIN:.2f} s of the empty hand before, to tare the force"
+            f" {LEAST_LEAD_IN + MARGIN:.2f} s of the empty hand before, to tare the force"
         )
     usual = turn[lead_in].mean()  # pyright: ignore[reportArgumentType]
 

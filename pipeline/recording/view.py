@@ -40,7 +40,7 @@ def onto_depth(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Frame:
+class RgbdFrame:
     """One picture, cropped; H x W pixels of the depth image.
 
     Attributes:
@@ -144,7 +144,7 @@ class View:
 
     def frames(
         self, numbers: Iterable[int] | None = None, *, whole: bool = False
-    ) -> Iterator[tuple[int, Frame]]:
+    ) -> Iterator[tuple[int, RgbdFrame]]:
         """Yield (number, frame) of these or all frames; damaged ones are left out and counted.
 
         `whole` pictures are not cropped to what sees where the band can be.
@@ -155,7 +155,7 @@ class View:
             if depth is None or color is None:
                 self.damaged[number] = "depth" if depth is None else "color"
             else:
-                yield number, self.frame_of(number, depth, color, window)
+                yield number, self.rgbd_frame(number, depth, color, window)
 
     def depth(self, number: int) -> np.ndarray | None:
         """A depth picture [m], 0 where unknown, of the camera's size; None where it is damaged."""
@@ -185,7 +185,7 @@ class View:
         """Stamp in a colour picture's header, as it was recorded [ns]."""
         return self.recording.color.values[self.index[number][1]].stamp
 
-    def marked(self, picture: np.ndarray, frame: Frame) -> np.ndarray:
+    def marked(self, picture: np.ndarray, frame: RgbdFrame) -> np.ndarray:
         """What a mask of the colour picture marks where the band can be: (H, W) as in `frame`.
 
         Args:
@@ -195,13 +195,13 @@ class View:
         seen = seen[self.window] if frame.pixels is None else onto_depth(seen, frame.pixels)
         return (seen > 0.5) & frame.near
 
-    def frame_of(
+    def rgbd_frame(
         self,
         number: int,
         depth: np.ndarray,
         color: np.ndarray,
         window: tuple[slice, slice] | None = None,
-    ) -> Frame:
+    ) -> RgbdFrame:
         """The frame of two decoded pictures."""
         window = window or self.window
         depth = depth[window]
@@ -213,7 +213,7 @@ class View:
         pixels = None if self._registered(color) else self._pixels(color, seen)
         color = color[window] if pixels is None else onto_depth(color, pixels)
         near = self._near(points, time) & (depth > BLIND)
-        return Frame(number, time, color, depth, points, near, pixels)
+        return RgbdFrame(number, time, color, depth, points, near, pixels)
 
     def _near(self, points: np.ndarray, time: float) -> np.ndarray:
         """Pixels of points (H, W, 3) above the floor that the band's length allows."""

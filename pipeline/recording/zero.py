@@ -175,11 +175,11 @@ def course(t: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
     if count < LEAST_BLOCKS:
         return 0.0, np.inf, float(np.std(x))
     blocks = np.array_split(np.arange(len(t)), count)
-    at, means = (np.array([v[block].mean() for block in blocks]) for v in (t - t.mean(), x))
-    slope, middle = np.polyfit(at, means, 1)
-    spread = float(np.sqrt(np.sum((means - slope * at - middle) ** 2) / (count - 2)))
+    at, averages = (np.array([v[block].mean() for block in blocks]) for v in (t - t.mean(), x))
+    slope, middle = np.polyfit(at, averages, 1)
+    spread = float(np.sqrt(np.sum((averages - slope * at - middle) ** 2) / (count - 2)))
     # A slow swing makes neighbouring blocks alike: there are fewer that are independent.
-    left = means - slope * at - middle
+    left = averages - slope * at - middle
     alike = np.clip(np.sum(left[1:] * left[:-1]) / max(np.sum(left**2), 1e-30), 0, 0.95)
     spread *= np.sqrt((1 + alike) / (1 - alike))
     return float(slope), spread / float(np.sqrt(np.sum(at**2))), spread / float(np.sqrt(count))

@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK, too_strong
 from pipeline.base.target import TARGET_AREA
-from rig.draw import drawn
+from rig.draw import sampled
 from rig.physics.compiled import compiled
 from rig.physics.integration import integrated
 from rig.physics.scene import ROD
@@ -57,7 +57,7 @@ def launch(
             (`trials.actuation_error`, normal in y and z) and the kick of the opening fingers
             (`rig.release_jitter`): equal numbers give every method the same ones. None: neither.
     """
-    params = drawn(params, band_name, launching=True)
+    params = sampled(params, band_name, launching=True)
     aim, kick = np.array([0.0, *draw]), np.zeros(3)
     if number is not None:
         rng = np.random.default_rng([params.rig.seed, 1_000_000 * params.trials.seed + number])

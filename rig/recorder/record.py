@@ -12,7 +12,7 @@ from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
 from pipeline.base.files import replacing
-from rig.draw import drawn
+from rig.draw import sampled
 from rig.physics.motion import HandMotion
 from rig.physics.robot import SENSOR_LEVER, Robot
 from rig.physics.scene import arm, joined, room, tube
@@ -52,7 +52,7 @@ def record(
     Args:
         picture_scale: Of the pictures' 640 x 480 pixels.
     """
-    params = drawn(params, band_name)
+    params = sampled(params, band_name)
     rig, setup = params.rig, params.setup
     rng = np.random.default_rng([rig.seed, *band_name.encode()])
     motion_rng, sensor_rng, clock_rng, camera_rng = rng.spawn(4)

@@ -31,7 +31,7 @@ def test_what_is_kept_is_what_would_be_made(layout, seen, params, monkeypatch) -
     (made,), _ = build_episodes(seen[0], "band1", params)
     made.save(layout.root / "made")
     monkeypatch.setattr("pipeline.recording.build.build_episodes", never)
-    (episode,), refused = stored.episodes_of(seen[0], "band1", params, layout)
+    (episode,), refused = stored.load_or_build(seen[0], "band1", params, layout)
     episode.save(layout.root / "found")
     assert files(layout.root / "found") == files(layout.root / "made") and not refused
 
@@ -45,7 +45,7 @@ def test_anything_changed_makes_it_again(layout, seen, params, monkeypatch) -> N
     monkeypatch.setattr("pipeline.recording.build.build_episodes", lambda *_: "made")
 
     def requested(path: Path = seen[0], band: str = "band1", params: Params = params):
-        return stored.episodes_of(path, band, params, layout)
+        return stored.load_or_build(path, band, params, layout)
 
     assert requested() != "made"
     other = shutil.copy(seen[0], layout.root / "other.mcap")

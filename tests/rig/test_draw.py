@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from pipeline.identify.posterior.likelihood import Tolerances
 from pipeline.params import Params
 from pipeline.params.identification import LEAST_SQUARES
-from rig.draw import OF_LAUNCHES, drawn
+from rig.draw import OF_LAUNCHES, sampled
 from tests.project import with_
 
 
@@ -23,20 +23,20 @@ def value_of(params: Params, key: str) -> float:
 
 
 def test_each_recording_has_its_own_within_the_ranges(params: Params) -> None:
-    worlds = [drawn(params, "band1"), drawn(params, "band2")]
-    worlds.append(drawn(with_(params, "rig", seed=params.rig.seed + 1), "band1"))
+    worlds = [sampled(params, "band1"), sampled(params, "band2")]
+    worlds.append(sampled(with_(params, "rig", seed=params.rig.seed + 1), "band1"))
     for key, (low, high) in params.rig.draws.items():
         if key in OF_LAUNCHES:
             continue
         values = [value_of(world, key) for world in worlds]
         assert len({*values}) == 3, key
         assert all(low <= value <= high for value in values), key
-    again = drawn(params, "band1")
+    again = sampled(params, "band1")
     assert all(value_of(again, key) == value_of(worlds[0], key) for key in params.rig.draws)
 
 
 def test_launches_and_recordings_share_no_draw(params: Params) -> None:
-    recording, launching = drawn(params, "band1"), drawn(params, "band1", launching=True)
+    recording, launching = sampled(params, "band1"), sampled(params, "band1", launching=True)
     for key in params.rig.draws:
         same = value_of(recording, key) == value_of(params, key)
         assert same == (key in OF_LAUNCHES)
@@ -64,5 +64,5 @@ ASSUMED = {  # of the identification and the lab, and the rig's number that it s
 def test_no_assumption_of_the_identification_is_the_rigs_number(params: Params) -> None:
     assumed = asdict(Tolerances()) | params.methods[LEAST_SQUARES].fixed | dict(params.setup)
     for name, key in ASSUMED.items():
-        hidden = value_of(params, key), value_of(drawn(params, "band1"), key)
+        hidden = value_of(params, key), value_of(sampled(params, "band1"), key)
         assert assumed[name] not in (*hidden, *params.rig.draws[key]), name

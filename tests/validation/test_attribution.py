@@ -6,13 +6,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.likelihood import Tolerances
 from pipeline.identify.posterior.residuals import Rule
 from pipeline.params import load
 from tests.project import ROOT
-from validation.campaigns.attribution import METHODS, PAGE, REPORT, against_given, block, recoil_of
-from validation.campaigns.runner import OURS
+from validation.campaigns.attribution import (
+    METHODS,
+    PAGE,
+    REPORT,
+    against_given,
+    block,
+    expect_orange,
+    recoil_of,
+)
+from validation.campaigns.runner import OURS, ResultLines
 from validation.campaigns.variants import with_variants
 from validation.projects import DEFAULTS
 
@@ -46,11 +55,11 @@ def test_every_variant_is_a_method_or_a_change_of_ours() -> None:
 
 
 def test_later_pictures_of_a_recoil_count_within_the_block_alone(episode) -> None:
-    usual = Rule().frames(episode)
+    usual = Rule().pictures(episode)
     assert usual.tolist() == [0, 2]
     with recoil_of("later_pictures"):
-        assert Rule().frames(episode).tolist() == [0, 2, 3]
-    assert Rule().frames(episode).tolist() == usual.tolist()
+        assert Rule().pictures(episode).tolist() == [0, 2, 3]
+    assert Rule().pictures(episode).tolist() == usual.tolist()
 
 
 def test_a_recoil_is_trusted_half_within_the_block_alone(episode) -> None:
@@ -73,6 +82,16 @@ def test_errors_of_given_landings_are_of_what_was_predicted() -> None:
     assert scores["error"] == pytest.approx([0.1, -0.1])
     assert scores["miss"] == pytest.approx([0.2, -0.1])
     assert np.isnan(scores["low"]).all() and not scores["inside"].any()
+
+
+def test_results_of_orange_are_not_left_out_of_a_report(tmp_path) -> None:
+    lines = ResultLines(tmp_path / "results.jsonl")
+    lines.add({"group": "bands"})
+    expect_orange(tmp_path, None)
+    lines.add({"group": "orange"})
+    expect_orange(tmp_path, tmp_path)
+    with pytest.raises(UserError, match="give --orange to report them too"):
+        expect_orange(tmp_path, None)
 
 
 def test_the_page_has_the_table_of_the_committed_report() -> None:

@@ -73,7 +73,7 @@ def scores(error: float, inside: int) -> dict:
 
 def test_figures_are_means_over_bands() -> None:
     lines = [
-        JOB | {"band": band, "scores": band_scores} | {"told": {"settled": settled}}
+        JOB | {"band": band, "scores": band_scores} | {"confidence": {"settled": settled}}
         for band, band_scores, settled in (
             ("a", scores(0.04, 9), True),
             ("b", scores(-0.02, 0), False),

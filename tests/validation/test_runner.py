@@ -2,13 +2,24 @@
 
 import os
 import time
+from argparse import Namespace
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from validation.campaigns.runner import THREADS, ResultLines, made_once, run, single_threaded
+from validation.campaigns.runner import (
+    THREADS,
+    ResultLines,
+    made_once,
+    prepare,
+    results_of,
+    run,
+    single_threaded,
+)
 from validation.reports import plain
 
 
@@ -77,6 +88,32 @@ def test_threads_are_as_before_after_the_block(monkeypatch) -> None:
 def test_what_is_there_is_not_made_again(tmp_path) -> None:
     path = tmp_path / "kept.json"
     assert made_once(path, lambda: {"a": 1}) == made_once(path, None) == {"a": 1}
+
+
+@pytest.mark.parametrize("only", [False, True])
+def test_results_by_arguments_are_of_these_jobs_and_made_where_missing(tmp_path, only) -> None:
+    args = Namespace(work=tmp_path, workers=1, minutes=10.0, report_only=only)
+    ResultLines(tmp_path / "results.jsonl").add({"number": 2, "square": 4})
+    lines = results_of(args, Square.__call__, [Square(3), Square(2)], seed=1)
+    assert [line["number"] for line in lines] == ([2] if only else [3, 2])
+    assert all(line["square"] == line["number"] ** 2 for line in lines)
+    assert [line for line in lines if "seed" in line] == lines[:-1]  # in what was made now
+    with pytest.raises(UserError, match=f"^{tmp_path}: holds no result of these jobs yet$"):
+        results_of(Namespace(**{**vars(args), "report_only": True}), None, [Square(7)])
+
+
+def test_what_jobs_need_is_prepared_unless_a_report_is_all(tmp_path) -> None:
+    args = Namespace(workers=1, minutes=10.0, report_only=False)
+    prepare(args, partial(touch, tmp_path), [Square(1), Square(2)])
+    assert {file.name for file in tmp_path.iterdir()} == {"1", "2"}
+    prepare(Namespace(report_only=True), None, [Square(3)])
+    args.minutes = 0.0
+    with pytest.raises(UserError, match="^--minutes: only 0 of 1 are prepared$"):
+        prepare(args, slow, [Square(4)])
+
+
+def touch(folder: Path, job: Square) -> None:
+    (folder / str(job.number)).touch()
 
 
 def test_results_are_plain_json() -> None:

@@ -89,7 +89,7 @@ def _steps(view: View, cloud: object) -> tuple[dict[str, float], list[int]]:
         spent["decode"] += seconds
         if any(picture is None for picture in pictures):
             continue
-        frame, seconds, _ = timed(partial(view.frame_of, number, *pictures))
+        frame, seconds, _ = timed(partial(view.rgbd_frame, number, *pictures))
         spent["points"] += seconds
         band_mask, seconds, _ = timed(partial(mask.mask, frame))
         spent["mask"] += seconds

@@ -24,6 +24,7 @@ from unittest import mock
 import numpy as np
 
 from pipeline.base import errors
+from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.likelihood import Tolerances, opening_time
 from pipeline.identify.posterior.residuals import Rule
@@ -33,7 +34,7 @@ from rig.oracle.world import World
 from validation.campaigns import runner
 from validation.campaigns.landings import SETS, together
 from validation.campaigns.rig_scores import built, recorded, saved, scored, sling_of, summaries
-from validation.campaigns.runner import OURS, PAPER, read
+from validation.campaigns.runner import OURS, PAPER, ResultLines, read
 from validation.campaigns.variants import priors_of, with_variants
 from validation.density import Calibrated, calibrated_by
 from validation.marked import block_of, fill, row
@@ -136,7 +137,7 @@ def recordings(orange: Path | None, pulls=("informative", "paper")) -> list[Band
 @contextmanager
 def recoil_of(method: str) -> Iterator[None]:
     """Change what the recoil counts, as a method's name says: less trust, or later pictures too."""
-    trusted, counted = Tolerances.of, Rule.frames
+    trusted, counted = Tolerances.of, Rule.pictures
 
     def doubled(episode: Episode) -> Tolerances:
         return replace(trusted(episode), way=2 * Tolerances.way)
@@ -146,7 +147,7 @@ def recoil_of(method: str) -> Iterator[None]:
 
     changes = {
         "recoil_trusted_half": (Tolerances, "of", doubled),
-        "later_pictures": (Rule, "frames", later),
+        "later_pictures": (Rule, "pictures", later),
     }
     with mock.patch.object(*changes[method]) if method in changes else nullcontext():
         yield
@@ -243,10 +244,17 @@ def _cell(method_figures: dict | None) -> str:
     return text
 
 
+def expect_orange(work: Path, orange: Path | None) -> None:
+    """Raises UserError where a report would leave out results that are there."""
+    if orange is None and ResultLines(work / "results.jsonl").where(group="orange"):
+        raise UserError(f"{work}: has results of `orange`, give --orange to report them too")
+
+
 def main() -> None:
     args = runner.parser(__doc__, REPORT, WORK, page=PAGE, orange=True).parse_args()
     if args.page:
         return fill(PAGE, block(read(args.report)))
+    expect_orange(args.work, args.orange)
     folders, every = {"work": args.work, "orange": args.orange}, recordings(args.orange)
     todo = [
         VariantJob(**asdict(recording), method=method) for recording in every for method in METHODS

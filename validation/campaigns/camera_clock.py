@@ -23,7 +23,7 @@ from pipeline.params import Params, load
 from pipeline.recording.delays import Delays, correct_delays
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.pulls import Pull
-from rig.draw import drawn
+from rig.draw import sampled
 from rig.recorder.record import record
 from validation.campaigns import runner
 from validation.campaigns.runner import made_once
@@ -63,7 +63,7 @@ def measured(job: Recorded, work: Path) -> dict:
     slip = made_once(truth, lambda: {"slip": record(params, job.band, path).slip_time})["slip"]
     pull = Pull.of(read_recording(path, params.setup, params.episode.delays), params.setup)
     delays = correct_delays(pull.shifted(camera=-job.late), params)[1]
-    latency = drawn(params, job.band).rig.pose_latency
+    latency = sampled(params, job.band).rig.pose_latency
     late = delays.camera.value - job.late
     return {
         "late": job.late,

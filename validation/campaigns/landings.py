@@ -60,7 +60,7 @@ OTHERWISE: tuple[tuple[str, dict], ...] = (  # how the first recording of a band
     ("paper", {"method": PAPER}),
 )
 LINE = 125  # characters, of README.md
-TOLD = "parameters", "derived", "settled", "steps"  # what is kept of a confidence
+STORED = "parameters", "derived", "settled", "steps"  # what is stored of a confidence
 BANDS, TEN = ("band1", "band2", "band3"), 10
 BOOTSTRAP = 2000
 
@@ -148,7 +148,7 @@ def identified(job: OneRecording, work: Path, keep: bool = False) -> dict:
         shutil.rmtree(folder)
     return {
         "scores": scores,
-        "told": {name: confidence.get(name) for name in TOLD},
+        "confidence": {name: confidence.get(name) for name in STORED},
         "delays": episode.metadata["preprocessing"].get("delays"),
         "identification_s": seconds,
         "cpu_s": time.process_time() - begin,
@@ -179,7 +179,7 @@ def figures(lines: list[dict]) -> dict:
         of_bands = summaries(good, "band")
         result[kind] = {
             "together": together(of_bands),
-            "settled": [sum(bool(line["told"]["settled"]) for line in good), len(good)],
+            "settled": [sum(bool(line["confidence"]["settled"]) for line in good), len(good)],
             "refused": {f"{line['band']} {line['number']}": line["failed"] for line in bad},
             "bands": of_bands,
         }
@@ -188,8 +188,8 @@ def figures(lines: list[dict]) -> dict:
 
 def brief(line: dict) -> dict:
     """What a report has of a line of results: its job, scores and whether the fit settled."""
-    short = {name: value for name, value in line.items() if name not in ("told", "delays")}
-    return short | ({"settled": line["told"]["settled"]} if "told" in line else {})
+    short = {name: value for name, value in line.items() if name not in ("confidence", "delays")}
+    return short | ({"settled": line["confidence"]["settled"]} if "confidence" in line else {})
 
 
 def together(of_bands: dict[str, dict]) -> dict:
@@ -197,13 +197,13 @@ def together(of_bands: dict[str, dict]) -> dict:
     bias = np.array([band["mean_bias"] for band in of_bands.values()])
     covered = np.array([band["coverage"] for band in of_bands.values()])
     rng = np.random.default_rng(0)
-    drawn = rng.choice(covered, (BOOTSTRAP, len(covered))).mean(axis=1)
+    resampled = rng.choice(covered, (BOOTSTRAP, len(covered))).mean(axis=1)
     return {
         "mean_size_of_bias": np.abs(bias).mean(),
         "worst_bias": bias[np.abs(bias).argmax()],
         "mean_miss_m": np.mean([band["mean_miss_m"] for band in of_bands.values()]),
         "coverage": covered.mean(),
-        "coverage_by_bands": np.quantile(drawn, [0.05, 0.95]),
+        "coverage_by_bands": np.quantile(resampled, [0.05, 0.95]),
         "least_coverage": covered.min(),
         "median_width": np.median([band["median_width"] for band in of_bands.values()]),
     }

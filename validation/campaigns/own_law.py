@@ -73,7 +73,7 @@ class OwnLaw:
     episode: Episode
 
 
-def drawn(params: Params, method: str, dips: Sequence[Dip], rng: np.random.Generator) -> OwnLaw:
+def sampled(params: Params, method: str, dips: Sequence[Dip], rng: np.random.Generator) -> OwnLaw:
     """A band of the first one's size, pulled with dips."""
     name, method_params = next(iter(params.bands)), params.methods[method]
     sling = ClampedBand.of(params.bands[name], params.setup, params.sling, law=method_params.law)
@@ -154,7 +154,7 @@ def ranked(params: Params, method: str, dips: Sequence[Dip], seed: Sequence[int]
         the recoil [s].
     """
     rng = np.random.default_rng(seed)
-    virtual_band = drawn(params, method, dips, rng)
+    virtual_band = sampled(params, method, dips, rng)
     outcome, confidence = calibrated_by(params, method, virtual_band.sling, [virtual_band.episode])
     names, samples = virtual_band.coordinates.names, outcome.samples
     assert samples is not None and outcome.coordinates is not None

@@ -51,7 +51,9 @@ class LoggingEvaluator:
         return evaluation
 
 
-def service(stage: str, band: str, method: str, params: Params, rollouts: int) -> LoggingEvaluator:
+def logging_evaluator(
+    stage: str, band: str, method: str, params: Params, rollouts: int
+) -> LoggingEvaluator:
     """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
     evaluate, layout = evaluator(params, band, method), Layout()
     sections = (params.bands[band], params.setup, params.sling, params.force, params.loss)

@@ -124,7 +124,7 @@ def fit_posterior(
         fitted = fit(recordings, coordinates, first.phi, **options)
         fitted = replace(fitted, steps=first.steps + fitted.steps)
     for expansion in fitted.expansions:
-        if not len(expansion.residuals.frame):
+        if not len(expansion.residuals.picture):
             print(
                 f"note: {expansion.residuals.episode.band}: its pictures show fewer than"
                 f" {LEAST_POINTS} points in each of {BINS} parts of the band, so its force alone is"

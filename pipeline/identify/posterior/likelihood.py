@@ -107,7 +107,7 @@ class Expansion:
 
     def rms(self, part: str) -> float:
         """Root mean square of what is left of force [N], held or recoil [m]; 0 of nothing."""
-        count = len(self.left) - 2 * len(self.residuals.frame)
+        count = len(self.left) - 2 * len(self.residuals.picture)
         bins, recoils = self.left[count:].reshape(2, -1), self.residuals.recoils
         parts = {"force": self.left[:count], "held": bins[:, ~recoils], "recoil": bins[:, recoils]}
         return float(np.sqrt(np.mean(parts[part] ** 2))) if parts[part].size else 0.0
@@ -129,9 +129,9 @@ class Expansion:
 
         What a law gets wrong of a recoil moves all of a picture's points together.
         """
-        seen, count = self.residuals, len(self.left) - 2 * len(self.residuals.frame)
+        seen, count = self.residuals, len(self.left) - 2 * len(self.residuals.picture)
         bins, gone = self.left[count:].reshape(2, -1), seen.gone()
-        pictures = [seen.frame == frame for frame in np.unique(seen.frame[seen.recoils])]
+        pictures = [seen.picture == picture for picture in np.unique(seen.picture[seen.recoils])]
         return max(
             (
                 _repeated(bins[axis, picture]) / gone[picture][0]
@@ -144,7 +144,7 @@ class Expansion:
     @property
     def pictures(self) -> list[float]:
         """Times of the pictures in which the recoil is seen, from the release [s]."""
-        seen, episode = self.residuals.frame[self.residuals.recoils], self.residuals.episode
+        seen, episode = self.residuals.picture[self.residuals.recoils], self.residuals.episode
         return (episode.cloud_time[np.unique(seen)] - episode.release_time).tolist()
 
 
@@ -174,9 +174,9 @@ def opening_time(episode: Episode, sling: ClampedBand, friction: float) -> float
     return float(np.clip(fall * 2 * friction * sling.grip_force / held, 5e-4, 0.05))
 
 
-def _that_count(episode: Episode) -> int:
-    """First pictures beyond which none counts."""
-    return max(Rule().frames(episode), default=-1) + 1
+def _picture_count(episode: Episode) -> int:
+    """How many of the first pictures hold all that count."""
+    return max(Rule().pictures(episode), default=-1) + 1
 
 
 class Failed(Exception):
@@ -187,7 +187,9 @@ class Likelihood:
     """Likelihood of the parameters of a band, by one recording.
 
     Attributes:
-        episode, sling, cutoff, tolerances: As given; the sling is that of this episode.
+        episode, cutoff: As given.
+        sling: As given, with the pads' opening time of this episode.
+        tolerances: By the episode's metadata, until `with_wider_tolerances`.
         moved: What was added to the camera's stamps before the fit [s].
     """
 
@@ -201,7 +203,7 @@ class Likelihood:
         end = np.searchsorted(episode.time, episode.release_time)
         place = episode.position[max(end - 5, 0) : end].mean(axis=0)
         self._away = place / np.linalg.norm(place)
-        self._frames = _that_count(episode)
+        self._picture_count = _picture_count(episode)
 
     def aligned(self, parameters: Parameters) -> Likelihood:
         """Set the camera's clock, in a copy, to where these parameters show the recoil best.
@@ -216,7 +218,7 @@ class Likelihood:
         moved = copy(self)
         moved.moved = best
         moved.episode = replace(self.episode, cloud_time=self.episode.cloud_time + best)
-        moved._frames = _that_count(moved.episode)
+        moved._picture_count = _picture_count(moved.episode)
         return moved
 
     def with_wider_tolerances(self, expansion: Expansion) -> Likelihood:
@@ -239,7 +241,7 @@ class Likelihood:
         return replace(
             self.episode,
             release_time=self.episode.release_time + release,
-            cloud_time=self.episode.cloud_time[: self._frames] + camera,
+            cloud_time=self.episode.cloud_time[: self._picture_count] + camera,
             position=self.episode.position + hand * self._away,
         )
 
@@ -356,6 +358,6 @@ class Likelihood:
         sizes |= {"force_gain": has.gain, "force_late": has.pose}
         sizes |= {"cloud_shift": has.shift, "cloud_turn": has.turn}
         columns = [sizes[re.sub("_[xyz]$", "", name)] * change for name, change in changes.items()]
-        for frame in np.unique(residuals.frame[residuals.recoils]):
-            columns.append(has.jitter * np.where(residuals.of_frame(frame), camera, 0.0))
+        for picture in np.unique(residuals.picture[residuals.recoils]):
+            columns.append(has.jitter * np.where(residuals.of_picture(picture), camera, 0.0))
         return np.array(columns)

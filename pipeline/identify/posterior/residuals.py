@@ -25,7 +25,7 @@ from pipeline.simulator.replay import recorded_force
 
 BINS = 16  # along the band, equal at rest
 LEAST_POINTS = 4  # of a bin
-MOST_POINTS = 320  # of a frame that are looked at
+MOST_POINTS = 320  # of a picture that are looked at
 WINDOW = 4  # edges on each side of a bin's own on which its point's foot may lie
 VISIBLE = 2 / np.pi  # mean of cos over the half of a tube that faces the camera
 
@@ -53,7 +53,7 @@ class Rule:
     way: float = 0.15
     bins: tuple[int, int] = (4, 12)
 
-    def frames(self, episode: Episode) -> np.ndarray:
+    def pictures(self, episode: Episode) -> np.ndarray:
         """Numbers of the pictures that count, shape (F,)."""
         time = episode.cloud_time - episode.release_time
         held = (time > self.held[0]) & (time < self.held[1])
@@ -88,7 +88,7 @@ class Residuals:
         cutoff: Of the low-pass that the recorded force went through [Hz].
         reference: Centre lines of one rollout [m], shape (K, L, 3).
         samples: Numbers of the force's, shape (S,).
-        frame, bin: Of each bin, which picture's and which along the band, shape (M,).
+        picture, bin: Of each bin, which picture's and which along the band, shape (M,).
     """
 
     episode: Episode
@@ -104,18 +104,18 @@ class Residuals:
 
     @property
     def size(self) -> int:
-        return 3 * len(self.samples) + 2 * len(self.frame)
+        return 3 * len(self.samples) + 2 * len(self.picture)
 
     @property
     def recoils(self) -> np.ndarray:
         """Which bins (M,) are of the recoil."""
-        return self.episode.cloud_time[self.frame] > self.episode.release_time
+        return self.episode.cloud_time[self.picture] > self.episode.release_time
 
     def _bin(self, reference: np.ndarray) -> None:
         episode = self.episode
         place = np.append(0, np.cumsum(self._edges)) / self._edges.sum()
         binned = []
-        for number in self.rule.frames(episode):
+        for number in self.rule.pictures(episode):
             cloud = episode.clouds[number]
             if len(cloud) < LEAST_POINTS:
                 continue
@@ -143,8 +143,8 @@ class Residuals:
             seen /= count[good, None]
             # what bending and tube add to a bin's mean point, as they do at the reference
             bias = (mean - foot_of_mean) - seen
-            frames = np.full(len(good), number)
-            binned.append((frames, good, edge_of_mean, mean, depth, np.cross(along, depth), bias))
+            pictures = np.full(len(good), number)
+            binned.append((pictures, good, edge_of_mean, mean, depth, np.cross(along, depth), bias))
         if not binned:
             raise UserError(
                 f"episode of {episode.band}: no picture of the drawn band or of its recoil shows"
@@ -152,7 +152,7 @@ class Residuals:
                 " `cloud` in params.yaml"
             )
         columns = zip(*binned, strict=True)
-        self.frame, self.bin, edge, self.point, self.depth, self.side, bias = (
+        self.picture, self.bin, edge, self.point, self.depth, self.side, bias = (
             np.concatenate(column) for column in columns
         )
         self._bias = np.stack([_dot(bias, self.depth), _dot(bias, self.side)])  # (2, M)
@@ -165,8 +165,8 @@ class Residuals:
         gap = (self.episode.force - force)[:, self.samples]
         line = np.asarray(rollouts.center_line, np.float32)
         point = self.point.astype(np.float32)[:, None]
-        start = line[:, self.frame[:, None], self._window]  # (N, M, W, 3)
-        step = line[:, self.frame[:, None], self._window + 1] - start
+        start = line[:, self.picture[:, None], self._window]  # (N, M, W, 3)
+        step = line[:, self.picture[:, None], self._window + 1] - start
         start -= point
         part = -_dot(start, step) / np.maximum(_dot(step, step), 1e-12)
         start += np.clip(part, 0, 1)[..., None] * step  # from the point to its foot
@@ -190,12 +190,12 @@ class Residuals:
 
         Where no picture of the drawn band counts, the hand at the release says it.
         """
-        episode, first = self.episode, self.rule.frames(self.episode)[0]
+        episode, first = self.episode, self.rule.pictures(self.episode)[0]
         if episode.cloud_time[first] < episode.release_time:
             drawn = self.reference[first, self.sling.middle]
         else:
             drawn = episode.position[episode.time <= episode.release_time][-1]
-        return np.linalg.norm(self.reference[self.frame, self.sling.middle] - drawn, axis=1)
+        return np.linalg.norm(self.reference[self.picture, self.sling.middle] - drawn, axis=1)
 
     def columns(self, left: np.ndarray) -> dict[str, np.ndarray]:
         """How the residuals change with what moves all measured forces or points alike, (R,) each.
@@ -213,7 +213,7 @@ class Residuals:
         since = (time - time[0]) / (time[-1] - time[0])
         force = self.episode.force[self.samples] - left[: 3 * count].reshape(3, count).T
         for name, course in (("late", np.gradient(force, time, axis=0)), ("gain", force)):
-            changes[f"force_{name}"] = np.append(course.T.ravel(), np.zeros(2 * len(self.frame)))
+            changes[f"force_{name}"] = np.append(course.T.ravel(), np.zeros(2 * len(self.picture)))
         arm = self.point - self.episode.camera
         turned = np.cross(arm, self.depth), np.cross(arm, self.side)
         for axis, letter in enumerate("xyz"):
@@ -230,9 +230,9 @@ class Residuals:
                 changes[f"{name}_{letter}"] = column
         return changes
 
-    def of_frame(self, number: int) -> np.ndarray:
-        """Which residuals are of one camera frame, shape (R,) bool."""
-        cloud = self.frame == number
+    def of_picture(self, number: int) -> np.ndarray:
+        """Which residuals are of one picture, shape (R,) bool."""
+        cloud = self.picture == number
         return np.concatenate([np.zeros(3 * len(self.samples), bool), cloud, cloud])
 
 

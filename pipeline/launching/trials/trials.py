@@ -30,8 +30,8 @@ SCHEMA = pa.schema(
         ("method", pa.string()),
         ("kind", pa.string()),  # virtual, measured or predicted
         ("target", pa.float64()),  # m; null where the launch had none
-        ("trial", pa.int64()),  # counts launches at a target; virtual ones of equal number are
-        # off by the same errors, whatever the method
+        ("trial", pa.int64()),  # counts launches at a target; virtual ones of equal target and
+        # number are off by the same errors, whatever the method
         ("draw_y", pa.float64()),  # m, as commanded
         ("draw_z", pa.float64()),
         ("predicted_y", pa.float64()),  # m, by the calibrated simulator; null where it fails
@@ -135,10 +135,12 @@ def aimed(stored: Stored, targets: list[float]) -> Batch:
 
 
 def launch_virtually(batch: Batch, launch: Callable) -> Batch:
-    """Launch a batch in a virtual world; launches of equal number have equal errors.
+    """Launch a batch in a virtual world; launches of equal target and number have equal errors.
+
+    Every method's batch has its targets in the same order, so a launch's place in it tells both.
 
     Args:
-        launch: `launch(draw, number)` gives landing_y [m], NaN where there is none, failure,
+        launch: `launch(draw, place)` gives landing_y [m], NaN where there is none, failure,
             hold_force [N] and flight. It goes to processes of its own: it keeps one core busy.
     """
     with Pool() as pool:

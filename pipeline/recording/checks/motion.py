@@ -12,7 +12,7 @@ from pipeline.recording.pulls import CALM
 from pipeline.recording.release import SETTLE
 from pipeline.recording.signals import Signals
 
-LEAD_IN, PAUSE = 0.5, 1.0  # s
+ADVISED_LEAD_IN, PAUSE = 0.5, 1.0  # s
 SETTLED = 0.02  # of the held force
 STILL = 0.005  # m/s
 TURN = 2.0  # degrees
@@ -21,9 +21,9 @@ LEAD = Check(
     "lead_in",
     "the time before the grasp with what taring the force takes",
     "of the grasp: a message of the gripper",
-    f"less than {LEAD_IN:g} s",
+    f"less than {ADVISED_LEAD_IN:g} s",
     "",
-    f"record {LEAD_IN} s or more, the force is tared there",
+    f"record {ADVISED_LEAD_IN} s or more, the force is tared there",
 )
 PAUSES = Check(
     "pause",
@@ -55,7 +55,7 @@ CHECKS = (LEAD, PAUSES, TURNS, REST)
 def findings(done: Processed) -> Iterator[Finding]:
     signals = done.signals
     lead = done.start + signals.grasp_time
-    if round(lead, 2) < LEAD_IN:
+    if round(lead, 2) < ADVISED_LEAD_IN:
         yield LEAD.found(f"only {lead:.2f} s of the empty hand come before the grasp")
     still, change = pause(signals)
     if still < PAUSE or change > SETTLED:

@@ -84,9 +84,9 @@ CHECKS = (CLOCK, DRIFT, DELAYED, UNKNOWN, RELEASED, CONFLICT, FROZEN, SMEARED)
 
 
 def findings(done: Processed) -> Iterator[Finding]:
-    force = done.pull.recording.wrench.delay
+    force = done.pull.recording.wrench.receipt_delay
     for stream, roles in topics(done):
-        most, offset = max(SLOW.get(role, BEHIND) for role in roles), force - stream.delay
+        most, offset = max(SLOW.get(role, BEHIND) for role in roles), force - stream.receipt_delay
         if not -most <= offset <= AHEAD:
             what = f"the stamps of {stream.topic} are {offset:+.3f} s off the force's, judged"
             yield CLOCK.found(f"{what} by the times of receipt")

@@ -25,7 +25,7 @@ class Company:
 
     def __init__(self, fitting: Callable[[str], list[Candidate]], frames: Collection[str]) -> None:
         self.fitting, self.frames = fitting, frames
-        self.courses: dict[str, sets.Track | None] = {}
+        self.tracks: dict[str, sets.Track | None] = {}
 
     def best(
         self, role: str, candidates: list[Candidate], chosen: dict[str, Choice]
@@ -56,9 +56,9 @@ class Company:
         """The gripper's topic as one opening: that of the fingers whose release the force shows."""
 
         def fall() -> int | None:
-            course = sets.course_of(wrench.channel, wrench.read)
-            k = course and sets.fall_of(course)
-            return int(course.stamp[k]) or None if course and k else None
+            track = sets.track_of(wrench.channel, wrench.read)
+            k = track and sets.fall_of(track)
+            return int(track.stamp[k]) or None if track and k else None
 
         return replace(
             gripper, convert=lambda stamps, values: sets.opening_of(values, stamps, fall)
@@ -87,31 +87,31 @@ class Company:
 
     # What they say
 
-    def _course(self, candidate: Candidate | Choice) -> sets.Track | None:
+    def _track(self, candidate: Candidate | Choice) -> sets.Track | None:
         choice = candidate.choice if isinstance(candidate, Candidate) else candidate
         topic = choice.channel.topic
-        if topic not in self.courses:
-            self.courses[topic] = sets.course_of(choice.channel, choice.read)
-        return self.courses[topic]
+        if topic not in self.tracks:
+            self.tracks[topic] = sets.track_of(choice.channel, choice.read)
+        return self.tracks[topic]
 
     def _alive(self, candidate: Candidate) -> bool:
         return sets.alive(candidate.choice.channel, candidate.choice.read)
 
     def _falls(self, candidate: Candidate) -> bool:
-        course = self._course(candidate)
-        return course is not None and sets.fall_of(course) is not None
+        track = self._track(candidate)
+        return track is not None and sets.fall_of(track) is not None
 
     def _followed(self, hands: list[Candidate], wrench: Choice) -> list[Candidate]:
         """Select the hands whose steps the force follows about as well as any's."""
-        force = self._course(wrench)
+        force = self._track(wrench)
         if force is None:
             return hands
         shares = {}  # of hands whose poses were recorded: others are not compared
         for hand in hands:
             choice = hand.choice
-            course = None if choice.convert else sets.course_of(choice.channel, choice.read)
-            if course:
-                shares[id(hand)] = sets.follows(force, course)
+            track = None if choice.convert else sets.track_of(choice.channel, choice.read)
+            if track:
+                shares[id(hand)] = sets.follows(force, track)
         most = max(shares.values(), default=0.0)
         if most < LEAST_FOLLOWS:
             return hands
@@ -119,7 +119,7 @@ class Company:
 
     def _opens(self, candidate: Candidate, wrench: Choice) -> bool:
         """Whether its fingers move when the force falls."""
-        force, fingers = self._course(wrench), self._course(candidate)
+        force, fingers = self._track(wrench), self._track(candidate)
         if force is None or fingers is None:
             return False
         k = sets.fall_of(force)

@@ -54,12 +54,12 @@ def read_container(path: Path) -> Container:
     path = Path(path)
     parts, held = bag.parts_of(path), 0
     if len(parts) == 1:
-        contents = _read(path, parts[0], held)[0]
-        return replace(contents, losses=[*bag.missing_parts(path), *contents.losses])
+        container = _read(path, parts[0], held)[0]
+        return replace(container, losses=[*bag.missing_parts(path), *container.losses])
     read = []
     for part in parts:
-        contents, held = _read(path, part, held)
-        read.append(contents)
+        container, held = _read(path, part, held)
+        read.append(container)
     return _one_of(path, read)
 
 
@@ -82,10 +82,10 @@ def _one_of(path: Path, read: list[Container]) -> Container:
     parts = bag.parts_of(path)
     channels = _merged(channel for container in read for channel in container.channels)
     named = list(zip(parts, read, strict=True))
-    losses = [f"{part.name}: {loss}" for part, contents in named for loss in contents.losses]
+    losses = [f"{part.name}: {loss}" for part, container in named for loss in container.losses]
     whole = f"all {len(parts)} parts of the bag were read, from {parts[0].name} on"
     notes = [] if path.is_dir() else [whole]
-    notes += dict.fromkeys(note for contents in read for note in contents.notes)
+    notes += dict.fromkeys(note for container in read for note in container.notes)
     return Container(path, channels, [*bag.missing_parts(path), *losses], notes)
 
 

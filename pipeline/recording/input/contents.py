@@ -1,6 +1,7 @@
 """The records of an MCAP file: messages by channel, what names them, and what was in their way.
 
-Which of them are believed, and what is lost, stands in `container`.
+Which records are believed is decided here, by the rules that `container` lists; what was lost is
+put into words there.
 """
 
 from __future__ import annotations

@@ -17,46 +17,46 @@ import numpy as np
 from pipeline.base.errors import UserError
 from pipeline.recording.input import clocks, pace
 from pipeline.recording.input.raw import Raw
+from pipeline.recording.input.roles import CAMERAS
 
-CAMERAS = ("color", "depth")
 CORRECTABLE = ("pose", "twist", "gripper")  # by log_time, if they have a clock of their own
 TWIN_TIME, TWIN_SIZE = 0.5e9, 5e6  # ns by which one step differs between two topics, at most
 
 
-def put_on_one_clock(raw: dict[str, Raw], late: Mapping[str, float]) -> None:
+def put_on_one_clock(topics: dict[str, Raw], late: Mapping[str, float]) -> None:
     """Mend the stamps of all topics in place, and note what was mended.
 
     Args:
-        raw: By role.
+        topics: By role.
         late: By what the stamps of a role are known to be late [s], which is taken off.
 
     Raises:
         UserError: for a topic whose clock cannot be mended, in one line.
     """
-    _take_rewinds_out(raw)
-    for series in raw.values():
-        series.late = int(np.count_nonzero(np.diff(series.stamp) < 0))
-        series.keep(clocks.arrival(series.stamp, series.log))
-        series.drop(clocks.outliers(series.stamp, series.log), "far off in time")
-        _take_bursts_out(series)
-    _take_steps_out(raw)
+    _take_rewinds_out(topics)
+    for raw in topics.values():
+        raw.disorder = int(np.count_nonzero(np.diff(raw.stamp) < 0))
+        raw.keep(clocks.arrival(raw.stamp, raw.log))
+        raw.drop(clocks.outliers(raw.stamp, raw.log), "far off in time")
+        _take_bursts_out(raw)
+    _take_steps_out(topics)
     for role, seconds in late.items():
-        if role in raw:
-            raw[role].stamp = raw[role].stamp - round(seconds * 1e9)
-    _on_one_clock(raw, late)
-    _at_one_rate(raw)
+        if role in topics:
+            topics[role].stamp = topics[role].stamp - round(seconds * 1e9)
+    _on_one_clock(topics, late)
+    _at_one_rate(topics)
 
 
-def _take_rewinds_out(raw: dict[str, Raw]) -> None:
+def _take_rewinds_out(topics: dict[str, Raw]) -> None:
     """Steps back of the machine's clock, stamps and log_time alike."""
-    for role, jumps in _agreed(raw, clocks.rewinds).items():
-        series = raw[role]
-        series.stamp = clocks.without(series.stamp, jumps)
-        series.log = clocks.without(series.log, jumps)
+    for role, jumps in _agreed(topics, clocks.rewinds).items():
+        raw = topics[role]
+        raw.stamp = clocks.without(raw.stamp, jumps)
+        raw.log = clocks.without(raw.log, jumps)
         for step in jumps:
-            at, size = (series.log[step.index] - series.log[0]) * 1e-9, step.size * 1e-9
+            at, size = (raw.log[step.index] - raw.log[0]) * 1e-9, step.size * 1e-9
             what = f"step of its machine's clock of {size:+.4f} s at {at:.2f} s taken out"
-            series.notes.append(what)
+            raw.notes.append(what)
 
 
 def _take_bursts_out(raw: Raw) -> None:
@@ -74,34 +74,34 @@ def _take_bursts_out(raw: Raw) -> None:
     )
 
 
-def _take_steps_out(raw: dict[str, Raw]) -> None:
+def _take_steps_out(topics: dict[str, Raw]) -> None:
     """Steps of the stamps' clock alone; the segment that fits the other topics is right.
 
     It is the one whose least delay of receipt is nearest to the median of those of topics without a
     step, or else to that of its own longest segment.
     """
-    agreed = _agreed(raw, clocks.steps)
-    start = min(series.log.min() for series in raw.values())
-    steady = [series for role, series in raw.items() if role not in agreed]
-    sound = [(series.log - series.stamp).min() for series in steady]
+    agreed = _agreed(topics, clocks.steps)
+    start = min(raw.log.min() for raw in topics.values())
+    steady = [raw for role, raw in topics.items() if role not in agreed]
+    sound = [(raw.log - raw.stamp).min() for raw in steady]
     for role, jumps in agreed.items():
-        samples = raw[role]
-        segment, delay = clocks.segments(len(samples.stamp), jumps), samples.log - samples.stamp
+        raw = topics[role]
+        segment, delay = clocks.segments(len(raw.stamp), jumps), raw.log - raw.stamp
         least = [delay[segment == k].min() for k in range(len(jumps) + 1)]
         usual = np.median(sound or [least[np.argmax(np.bincount(segment))]])
         base = int(np.argmin(np.abs(np.array(least, float) - usual)))
-        samples.stamp = clocks.without(samples.stamp, jumps, base)
+        raw.stamp = clocks.without(raw.stamp, jumps, base)
         for step in jumps:
             at, size = (step.log - start) * 1e-9, step.size * 1e-9
-            samples.notes.append(f"clock step of {size:+.4f} s at {at:.2f} s taken out")
-        samples.late -= sum(step.size < 0 for step in jumps)
+            raw.notes.append(f"clock step of {size:+.4f} s at {at:.2f} s taken out")
+        raw.disorder -= sum(step.size < 0 for step in jumps)
 
 
 def _agreed(
-    raw: dict[str, Raw], find: Callable[[np.ndarray, np.ndarray], list[clocks.Jump]]
+    topics: dict[str, Raw], find: Callable[[np.ndarray, np.ndarray], list[clocks.Jump]]
 ) -> dict[str, list[clocks.Jump]]:
     """Steps of each role; those at one time have the size that the fastest topic tells."""
-    jumps = {role: find(series.stamp, series.log) for role, series in raw.items()}
+    jumps = {role: find(raw.stamp, raw.log) for role, raw in topics.items()}
     jumps = {role: steps for role, steps in jumps.items() if steps}
     for role, steps in jumps.items():
         for k, step in enumerate(steps):
@@ -114,7 +114,7 @@ def _agreed(
             best = min(twins, key=lambda twin: (not twin.exact, twin.period))
             if not best.exact and role not in CORRECTABLE:
                 raise UserError(
-                    f"the clock of {raw[role].topic} steps by {step.size * 1e-9:+.3f} s,"
+                    f"the clock of {topics[role].topic} steps by {step.size * 1e-9:+.3f} s,"
                     " and its rate is too uneven to tell by how much exactly: record again without"
                     " setting clocks"
                 )
@@ -122,44 +122,44 @@ def _agreed(
     return jumps
 
 
-def _on_one_clock(raw: dict[str, Raw], late: Mapping[str, float]) -> None:
+def _on_one_clock(topics: dict[str, Raw], late: Mapping[str, float]) -> None:
     """Topics on another clock than the wrench's, by their least delays of receipt.
 
     What controllers publish is put right; force and pictures that differ among themselves are
     refused, and the message names that which is furthest from the median of all topics.
     """
-    wrench = raw["wrench"]
+    wrench = topics["wrench"]
     offsets = {
-        role: clocks.offset(series.stamp, series.log, wrench.stamp, wrench.log)
-        for role, series in raw.items()
+        role: clocks.offset(raw.stamp, raw.log, wrench.stamp, wrench.log)
+        for role, raw in topics.items()
     }
     middle = float(np.median(list(offsets.values())))
     needed = {role: middle - offsets[role] for role in offsets if role not in CORRECTABLE}
     if np.ptp(list(needed.values())) > clocks.LIMITS.tolerance:
         worst, off = max(needed.items(), key=lambda pair: abs(pair[1]))
         raise UserError(
-            f"the stamps of {raw[worst].topic} are {off:+.3f} s off the other topics'"
+            f"the stamps of {topics[worst].topic} are {off:+.3f} s off the other topics'"
             f" clock, record all topics with one clock{_camera_cure(offsets, late)}"
         )
     for role in CORRECTABLE:
-        if role in raw and abs(offsets[role]) > clocks.LIMITS.tolerance:
-            raw[role].stamp = raw[role].stamp + round(offsets[role] * 1e9)
-            raw[role].notes.append(
+        if role in topics and abs(offsets[role]) > clocks.LIMITS.tolerance:
+            topics[role].stamp = topics[role].stamp + round(offsets[role] * 1e9)
+            topics[role].notes.append(
                 f"on another clock: {offsets[role]:+.3f} s added to its stamps by log_time, good to"
                 " about a millisecond"
             )
 
 
-def _at_one_rate(raw: dict[str, Raw]) -> None:
+def _at_one_rate(topics: dict[str, Raw]) -> None:
     """The other topics' clocks against the wrench's; colour and depth have one."""
-    drifts = {role: clocks.drift(series.stamp, series.log) for role, series in raw.items()}
+    drifts = {role: clocks.drift(raw.stamp, raw.log) for role, raw in topics.items()}
     drifts |= dict.fromkeys(CAMERAS, clocks.of_one_clock([drifts[role] for role in CAMERAS]))
-    reference, span = drifts.pop("wrench"), float(np.ptp(raw["wrench"].stamp)) * 1e-9
+    reference, span = drifts.pop("wrench"), float(np.ptp(topics["wrench"].stamp)) * 1e-9
     for role, growth in drifts.items():
-        samples = raw[role]
-        samples.drift = clocks.ClockRate.of(growth, reference, span)
-        if samples.drift.taken_out:
-            samples.stamp = samples.drift.without(samples.stamp)
+        raw = topics[role]
+        raw.drift = clocks.ClockRate.of(growth, reference, span)
+        if raw.drift.taken_out:
+            raw.stamp = raw.drift.without(raw.stamp)
 
 
 def _camera_cure(offsets: dict[str, float], late: Mapping[str, float]) -> str:

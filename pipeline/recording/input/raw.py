@@ -33,7 +33,7 @@ class Raw:
     lost: Counter[str]
     reason: str = ""  # why the first damaged message cannot be read
     notes: list[str] = field(default_factory=list)
-    late: int = 0  # how often the stamps go back
+    disorder: int = 0  # how often the stamps go back
     bursts: pace.Bursts | None = None
     drift: clocks.ClockRate = clocks.ClockRate()
 

@@ -1,7 +1,8 @@
 """MCAP file to `Recording`: which topic is which, their signals on header stamps, checked.
 
-Everything comes sorted by header.stamp; log_time is when a message was received, which is late and
-jitters, and serves only to notice what is wrong with a stamp's clock (`clocks`).
+Everything comes sorted by header.stamp. log_time is when a message was received: it is late and
+jitters, so it only shows what is wrong with a stamp's clock and helps to mend it (`clocks`), or
+stands in for a gripper's stamps where there are none.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.container import Container, read_container
 from pipeline.recording.input.frames import TransformTree
 from pipeline.recording.input.readings import Picture
+from pipeline.recording.input.roles import CAMERAS
 from pipeline.recording.input.stream import Stream
 from pipeline.recording.input.streams import streams_of
 from pipeline.recording.input.topics import camera_of, choose
@@ -29,8 +31,7 @@ from pipeline.recording.input.words import shortened
 
 SHOWN = 3  # losses in an error
 LINE, LOSS = 1000, 300  # characters of an error and of a loss in it
-CAMERAS = ("color", "depth")
-ROLES = ("wrench", "pose", "twist", "gripper", *CAMERAS)
+STREAMS = ("wrench", "pose", "twist", "gripper", *CAMERAS)
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ class Recording:
 
     @property
     def streams(self) -> dict[str, Stream[Any]]:
-        by_role = {role: getattr(self, role) for role in ROLES}
+        by_role = {role: getattr(self, role) for role in STREAMS}
         return {role: stream for role, stream in by_role.items() if stream}
 
     def depth_picture(self, number: int) -> np.ndarray | None:
@@ -126,7 +127,7 @@ def recording_of(
         transforms = transforms_of(container)
         chosen = choose(container, setup, transforms.frames)
         color_camera, depth_camera = (camera_of(chosen, role) for role in CAMERAS)
-        by_role = {role: chosen[role] for role in ROLES if role in chosen}
+        by_role = {role: chosen[role] for role in STREAMS if role in chosen}
         late = late_by(delays)
         streams, remarks = streams_of(by_role, late)
     except UserError as error:

@@ -117,6 +117,7 @@ HAND = {
     "doubts": (*COMMANDS, *THINGS),
     "rate": 10,
 }
+CAMERAS = ("color", "depth")  # roles of pictures
 ROLES = {
     "wrench": Role(
         "force (a geometry_msgs/WrenchStamped topic)",

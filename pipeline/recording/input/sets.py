@@ -47,7 +47,7 @@ class Track:
     values: np.ndarray
 
 
-def course_of(
+def track_of(
     channel: Channel, read: Callable[[bytes], Reading], most: int = LOOKED_AT
 ) -> Track | None:
     """Track of at most so many messages, evenly spread; None where fewer than two can be read."""
@@ -71,8 +71,8 @@ def course_of(
 
 def alive(channel: Channel, read: Callable[[bytes], Reading]) -> bool:
     """Whether what the messages say ever changes."""
-    course = course_of(channel, read, FEW)
-    return course is not None and bool(np.ptp(course.values, axis=0).any())
+    track = track_of(channel, read, FEW)
+    return track is not None and bool(np.ptp(track.values, axis=0).any())
 
 
 def sides_of(topics: Iterable[tuple[str, str]]) -> list[set[str]]:
@@ -94,9 +94,9 @@ def apart(first: Iterable[str], other: Iterable[str], sides: Sequence[set[str]])
     return any(a & side and b & side and not a & b & side for side in sides)
 
 
-def fall_of(course: Track) -> int | None:
+def fall_of(track: Track) -> int | None:
     """Number of the message at which a force (N, 3) falls for good, as of a band that is let go."""
-    force = course.values[:, :3]
+    force = track.values[:, :3]
     if len(force) < 6 * AROUND:
         return None
     windows = np.lib.stride_tricks.sliding_window_view(force, AROUND, axis=0)
@@ -118,7 +118,7 @@ def follows(force: Track, hand: Track) -> float:
     edges = np.linspace(max(force.time[0], hand.time[0]), min(end, hand.time[-1]), STEPS + 1)
     if not edges[-1] > edges[0]:
         return 0.0
-    f, x = (_means(series, edges) for series in (force, hand))
+    f, x = (_means(track, edges) for track in (force, hand))
     finite = np.isfinite(f).all(axis=1) & np.isfinite(x).all(axis=1)
     if finite.sum() < STEPS / 3:
         return 0.0
@@ -176,12 +176,12 @@ def _alike(values: np.ndarray) -> bool:
     return bool((np.corrcoef(values.T) > ALIKE).all())
 
 
-def _means(course: Track, edges: np.ndarray) -> np.ndarray:
+def _means(track: Track, edges: np.ndarray) -> np.ndarray:
     """Means of the first three values between edges (K + 1,), NaN where nothing is, (K, 3)."""
-    bins = np.searchsorted(edges, course.time, side="right") - 1
+    bins = np.searchsorted(edges, track.time, side="right") - 1
     inside = (bins >= 0) & (bins < len(edges) - 1)
     count = np.bincount(bins[inside], minlength=len(edges) - 1)
-    sums = [np.bincount(bins[inside], v[inside], len(edges) - 1) for v in course.values[:, :3].T]
+    sums = [np.bincount(bins[inside], v[inside], len(edges) - 1) for v in track.values[:, :3].T]
     with np.errstate(invalid="ignore"):
         return np.stack(sums, axis=1) / np.where(count > 0, count, np.nan)[:, None]
 

@@ -31,7 +31,7 @@ class Stream(Generic[Values]):
         frame: frame_id of its messages.
         stamp: header.stamp, ns, shape (S,), strictly increasing.
         values: One column a quantity, shape (S, C), or `Picture`s, length S.
-        delay: Median of log_time - stamp [s].
+        receipt_delay: Median of log_time - stamp [s].
         lost: Messages that are not in it, for whatever reason.
         notes: What was lost or mended, in words.
         bursts: In which the stamps came; None where they were even.
@@ -43,7 +43,7 @@ class Stream(Generic[Values]):
     frame: str
     stamp: np.ndarray
     values: Values
-    delay: float
+    receipt_delay: float
     lost: int
     notes: list[str] = field(default_factory=list)
     bursts: pace.Bursts | None = None

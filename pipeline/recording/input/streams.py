@@ -1,4 +1,4 @@
-"""One topic's messages to a `Stream`: read, put on one clock, sorted, and what was lost said.
+"""All topics' messages to `Stream`s: read, put on one clock, sorted, and what was lost said.
 
 A message is lost where it cannot be read, is not finite or absurdly large, has no stamp or one far
 from its neighbours', names another frame than the rest, has the stamp of another, or, of force and
@@ -41,16 +41,16 @@ def streams_of(
     Raises:
         UserError: for a topic that cannot be used, in one line.
     """
-    raw, notes = {}, []
+    topics, notes = {}, []
     for role, choice in chosen.items():
         try:
-            raw[role] = read_raw(role, choice)
+            topics[role] = read_raw(role, choice)
         except UserError as error:
             if role not in OPTIONAL:
                 raise
             notes.append(f"{error}: done without it")
-    put_on_one_clock(raw, late or {})
-    streams = {role: _sorted(samples) for role, samples in raw.items()}
+    put_on_one_clock(topics, late or {})
+    streams = {role: _sorted(raw) for role, raw in topics.items()}
     origin = int(streams["wrench"].stamp[0])
     first = min(stream.stamp[0] for stream in streams.values())
     last = max(stream.stamp[-1] for stream in streams.values())
@@ -60,8 +60,8 @@ def streams_of(
 
 
 def _sorted(raw: Raw) -> Stream[Any]:
-    if raw.late > 0:
-        raw.notes.append(f"{counted(raw.late)} out of order, sorted by stamp")
+    if raw.disorder > 0:
+        raw.notes.append(f"{counted(raw.disorder)} out of order, sorted by stamp")
     raw.keep(np.argsort(raw.stamp, kind="stable"))
     raw.drop(np.diff(raw.stamp, prepend=raw.stamp[0] - 1) == 0, "with the stamp of another")
     if len(raw.stamp) < 2:

@@ -18,6 +18,7 @@ from pipeline.recording.input.container import Container
 from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.decode import Unreadable, decoder, message_reader
 from pipeline.recording.input.roles import (
+    CAMERAS,
     OPTIONAL,
     ROLES,
     TRIES,
@@ -30,7 +31,6 @@ from pipeline.recording.input.words import few
 
 SHOWN = 12  # topics named in a message
 COLOUR = {"color": "colour", "depth": "depth"}
-PICTURES = tuple(COLOUR)
 VIDEO = ("FFMPEGPacket", "CompressedVideo")
 
 
@@ -107,7 +107,7 @@ class _Chooser:
 
     def lacking(self, role: str) -> UserError:
         what = ROLES[role].what
-        if role in PICTURES:
+        if role in CAMERAS:
             self.problems += [
                 f"{c.topic} is video ({of.kind_of(_type(c))}): record images"
                 for c in self.container.channels
@@ -138,7 +138,7 @@ class _Chooser:
         if candidate is None:
             problem = (self.problems or [f"{name} has no messages, or fingers only"])[0]
             raise UserError(f"{where}: {problem}")
-        if role in PICTURES and (problem := undecodable(role, candidate.choice)):
+        if role in CAMERAS and (problem := undecodable(role, candidate.choice)):
             raise UserError(f"{where}: {name}: {problem}")
         return replace(candidate.choice, why=f"setup.topics.{role}")
 
@@ -160,7 +160,7 @@ class _Chooser:
 
     def _suits(self, role: str, candidate: Candidate) -> bool:
         """Pictures: whether they are colour or depth, and of a kind that can be decoded."""
-        if role not in PICTURES:
+        if role not in CAMERAS:
             return True
         picture, named = candidate.typical.value, "depth" in candidate.topic.lower()
         deep = images.is_depth(picture) or (picture.encoding == "mono16" and named)

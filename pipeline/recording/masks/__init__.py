@@ -13,13 +13,13 @@ from pipeline.base.errors import UserError
 from pipeline.params.recording import Sam3
 from pipeline.recording.masks.folder import FolderMask
 from pipeline.recording.masks.ridge import RidgeMask
-from pipeline.recording.view import Frame, View
+from pipeline.recording.view import RgbdFrame, View
 
 
 class Mask(Protocol):
     """A backend that has learned from a view."""
 
-    def mask(self, frame: Frame) -> np.ndarray:
+    def mask(self, frame: RgbdFrame) -> np.ndarray:
         """Pixels of the band, shape (H, W), bool."""
         ...
 

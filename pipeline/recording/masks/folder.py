@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.recording.input import images
-from pipeline.recording.view import Frame, View
+from pipeline.recording.view import RgbdFrame, View
 
 MASK_NAME = re.compile(r"[0-9]+\.png")
 
@@ -51,7 +51,7 @@ class FolderMask:
                 f" {missing[0].name} first; give a black one where no band is seen"
             )
 
-    def mask(self, frame: Frame) -> np.ndarray:
+    def mask(self, frame: RgbdFrame) -> np.ndarray:
         file = self._file(frame.number)
         try:
             picture = images.grey(np.fromfile(file, np.uint8), self.size)

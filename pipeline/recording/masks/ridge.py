@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from pipeline.recording.masks.hand import REACH, Colors, Shape
-from pipeline.recording.view import Frame, Scene, View, length
+from pipeline.recording.view import RgbdFrame, Scene, View, length
 
 LEARNING_FRAMES = 48
 HAND_FRAMES = 10
@@ -76,7 +76,7 @@ class RidgeMask:
             others = np.concatenate([pixels for _, pixels in hand])
             self.colors = Colors.learn(np.concatenate(band), others)
 
-    def mask(self, frame: Frame) -> np.ndarray:
+    def mask(self, frame: RgbdFrame) -> np.ndarray:
         candidates = self._candidates(frame)
         rows, columns = np.nonzero(candidates)
         points = frame.points[rows, columns]
@@ -88,7 +88,7 @@ class RidgeMask:
         candidates[rows[~keep], columns[~keep]] = False
         return _large_enough(candidates, self.focal * self.scene.diameter / frame.depth[candidates])
 
-    def _candidates(self, frame: Frame) -> np.ndarray:
+    def _candidates(self, frame: RgbdFrame) -> np.ndarray:
         """Thin, new and near pixels, shape (H, W)."""
         stands_out = np.maximum(RIDGE * self.scene.diameter, NOISE * self.noise * frame.depth**2)
         new = frame.near & (self.background - frame.depth > stands_out)
@@ -116,7 +116,7 @@ class RidgeMask:
         """Points relative to where the hanging band is grasped, shape (S, 3)."""
         return points - self.scene.signals.hand(self.scene.signals.grasp_time)
 
-    def _around_hand(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+    def _around_hand(self, frame: RgbdFrame) -> tuple[np.ndarray, np.ndarray]:
         """Points (S, 3) from the tool centre point where the band cannot be; colours (S, 3)."""
         taut = self.scene.taut(frame.time)
         away = frame.points - self.scene.signals.hand(frame.time).astype(np.float32)
@@ -125,7 +125,7 @@ class RidgeMask:
             other[other] = self._off_lines(frame.points[other], frame.time) > 0
         return away[other], frame.color[other]
 
-    def _surely(self, frame: Frame) -> np.ndarray:
+    def _surely(self, frame: RgbdFrame) -> np.ndarray:
         """Colours (S, 3) of the taut band where nothing else is near."""
         candidates = self._candidates(frame)
         points = frame.points[candidates]

@@ -16,7 +16,7 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.params.recording import Sam3
-from pipeline.recording.view import Frame, View
+from pipeline.recording.view import RgbdFrame, View
 
 TOKENS = 32  # of a prompt
 NOTHING = -10.0  # logit of a mask that is not there
@@ -38,7 +38,7 @@ class Sam3Mask:
             raise UserError(f"{view.recording.path}: no colour picture in the window is readable")
         self.logits = dict(zip(self.numbers, self._track(model, tokenizer, settings), strict=True))
 
-    def mask(self, frame: Frame) -> np.ndarray:
+    def mask(self, frame: RgbdFrame) -> np.ndarray:
         camera = self.view.recording.color_camera
         logits = cv2.resize(self.logits[frame.number], (camera.width, camera.height))
         return self.view.marked(logits > 0, frame)

@@ -16,7 +16,7 @@ def value(log: float, deviation: float) -> ValueOfRecording:
     return ValueOfRecording(value=middle, low=low, high=high, deviation=deviation)
 
 
-def drawn(rng, logs, deviations) -> list[ValueOfRecording]:
+def sampled(rng, logs, deviations) -> list[ValueOfRecording]:
     """What recordings say whose errors are normal, of truths whose logarithms are `logs`."""
     return [
         value(log + deviation * rng.normal(), deviation)
@@ -30,7 +30,7 @@ def test_a_band_that_keeps_is_rarely_said_to_change(count) -> None:
     rng = np.random.default_rng(1)
     deviations = np.linspace(0.01, 0.03, count)
     alarms = [
-        bool(changes({name: drawn(rng, [12.0] * count, deviations) for name in ("e", "d")}))
+        bool(changes({name: sampled(rng, [12.0] * count, deviations) for name in ("e", "d")}))
         for _ in range(2000)
     ]
     assert 0.005 < np.mean(alarms) < FALSE_ALARM + 0.02
@@ -41,9 +41,9 @@ def test_a_change_of_five_combined_deviations_is_said() -> None:
     deviations = [0.01, 0.02, 0.02]
     step = -5 * np.hypot(0.01, 0.02)
     for _ in range(200):
-        result = changes({"e": drawn(rng, [12, 12 + step, 12 + step], deviations)})
+        result = changes({"e": sampled(rng, [12, 12 + step, 12 + step], deviations)})
         assert result and result[0].earlier == 0 and result[0].ratio < 1
-    many = [changes({"e": drawn(rng, [12, 12, 12 + step], deviations)}) for _ in range(200)]
+    many = [changes({"e": sampled(rng, [12, 12, 12 + step], deviations)}) for _ in range(200)]
     assert np.mean([newest(trial) == 2 for trial in many]) > 0.9
 
 

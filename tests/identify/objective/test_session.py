@@ -1,4 +1,4 @@
-"""The service of the searching stages: one memory a band, whatever the method, and what it says."""
+"""The evaluator of the searching stages: one memory a band, whatever the method; what it says."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ UNIT = np.random.default_rng(1).random((4, 5))
 
 @pytest.fixture
 def evaluators(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Evaluate]:
-    """A folder with an episode; the evaluators that a service makes, of a known function."""
+    """A folder with an episode; evaluators of the stages, of a known function."""
     monkeypatch.chdir(tmp_path)
     toy.episode().save(Layout().episode("band1"))
     write_json(Layout().clamps("band1"), {})
@@ -36,7 +36,7 @@ def evaluators(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Evaluate
 
 
 def serve(method: str, params=PARAMS, stage: str = "history"):
-    return session.service(stage, "band1", method, params, 8)(UNIT)
+    return session.logging_evaluator(stage, "band1", method, params, 8)(UNIT)
 
 
 def test_methods_and_stages_share_what_was_simulated(evaluators: list[Evaluate]) -> None:
@@ -102,8 +102,8 @@ def test_all_episodes_of_a_band_come_in_their_order(evaluators: list[Evaluate]) 
 def test_progress_says_how_far_it_is_and_what_was_recalled(
     evaluators: list[Evaluate], capsys: pytest.CaptureFixture
 ) -> None:
-    service = session.service("history", "band1", "de", PARAMS, 12)
-    service(UNIT), service(UNIT), service(1 - UNIT)
+    evaluate = session.logging_evaluator("history", "band1", "de", PARAMS, 12)
+    evaluate(UNIT), evaluate(UNIT), evaluate(1 - UNIT)
     summary = [parse(line) for line in capsys.readouterr().err.splitlines()]
     least = [
         f"best {3 * min(rosenbrock(x).min() for x in some):.5g}"

@@ -13,7 +13,7 @@ from pipeline.identify.posterior.likelihood import (
 )
 
 PHI, INNER, FORCES, BINS = 4, 3, 15, 12
-FRAME = np.repeat([7, 8, 9], 4)
+PICTURE = np.repeat([7, 8, 9], 4)
 NAMES = [f"{name}_{axis}" for axis in "xyz" for name in ("force_bias", "force_drift")]
 NAMES += [f"{name}_{axis}" for axis in "xyz" for name in ("cloud_shift", "cloud_turn")]
 NAMES += ["force_late"]
@@ -28,11 +28,11 @@ class Case:
         self.tolerances = Tolerances(**tolerances)
         self.columns = {name: rng.normal(0, 1, size) for name in NAMES}
         self.residuals = SimpleNamespace(
-            frame=FRAME,
-            recoils=FRAME > 7,
+            picture=PICTURE,
+            recoils=PICTURE > 7,
             columns=lambda left: dict(self.columns),
-            of_frame=lambda number: np.concatenate(
-                [np.zeros(3 * FORCES, bool), FRAME == number, FRAME == number]
+            of_picture=lambda number: np.concatenate(
+                [np.zeros(3 * FORCES, bool), PICTURE == number, PICTURE == number]
             ),
             spread=self.spread,
         )
@@ -67,8 +67,8 @@ class Case:
         ]
         linear.append(has.pose * self.columns["force_late"])
         linear += [
-            has.jitter * np.where(self.residuals.of_frame(frame), self.nuisance_slopes[1], 0)
-            for frame in (8, 9)
+            has.jitter * np.where(self.residuals.of_picture(picture), self.nuisance_slopes[1], 0)
+            for picture in (8, 9)
         ]
         sigma = self.spread(has.force, has.cloud, has.way)
         rows = np.concatenate([self.slopes, self.nuisance_slopes, linear]).T / sigma[:, None]

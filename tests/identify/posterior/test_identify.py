@@ -62,9 +62,9 @@ def both(exact):
 def test_what_moves_a_whole_picture_of_the_recoil_counts_as_one_error(first) -> None:
     """A constant repeats itself in all bins, alternating signs in none."""
     (expansion,) = first.fit.expansions
-    seen, count = expansion.residuals, len(expansion.left) - 2 * len(expansion.residuals.frame)
-    frame = seen.frame[seen.recoils][0]
-    bins = np.flatnonzero(seen.frame == frame)
+    seen, count = expansion.residuals, len(expansion.left) - 2 * len(expansion.residuals.picture)
+    picture = seen.picture[seen.recoils][0]
+    bins = np.flatnonzero(seen.picture == picture)
     gone = seen.gone()[bins[0]]
     for signs, repeated in ((1.0, np.sqrt(len(bins))), ((-1.0) ** np.arange(len(bins)), 1.0)):
         left = np.zeros_like(expansion.left)
@@ -190,19 +190,19 @@ def test_pictures_count_by_time_and_by_the_measured_cloud(exact):
     """Held in the last half second, of the recoil to 34 ms; where it is back in all, the first."""
     episode = exact[0]
     since = episode.cloud_time - episode.release_time
-    count = since[Rule().frames(episode)]
+    count = since[Rule().pictures(episode)]
     held = count[count < 0]
     assert len(held) == np.count_nonzero((since > -0.5) & (since < -0.02))
     assert 1 <= np.count_nonzero(count > 0) and count.max() <= 0.034
-    assert since[Rule(latest=1e-6).frames(episode)].max() < 0
+    assert since[Rule(latest=1e-6).pictures(episode)].max() < 0
     first = since[since > 0].min()
-    assert since[Rule(recoil=1e-6).frames(episode)].max() == first  # for want of earlier ones
-    assert since[Rule(recoil=0.2, latest=0.2, way=-1.0).frames(episode)].max() > 0.1
+    assert since[Rule(recoil=1e-6).pictures(episode)].max() == first  # for want of earlier ones
+    assert since[Rule(recoil=0.2, latest=0.2, way=-1.0).pictures(episode)].max() > 0.1
     home = [np.where(t > 0, 0 * c, c) for t, c in zip(since, episode.clouds, strict=True)]
-    came_back = since[Rule().frames(replace(episode, clouds=home))]
+    came_back = since[Rule().pictures(replace(episode, clouds=home))]
     assert np.count_nonzero(came_back > 0) == 1
     short = Rule(held=(-0.2, -0.02), force_until=-0.3)
-    assert len(short.frames(episode)) < len(count)
+    assert len(short.pictures(episode)) < len(count)
     assert len(short.samples(episode)) < len(Rule().samples(episode))
 
 

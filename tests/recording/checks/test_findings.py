@@ -89,7 +89,9 @@ def test_times_of_receipt_tell_of_another_clock(checked) -> None:
     )
     for role, cases in (("pose", poses), ("color", seen)):
         for offset, message in cases.items():
-            stream = replace(getattr(recording, role), delay=recording.wrench.delay - offset)
+            stream = replace(
+                getattr(recording, role), receipt_delay=recording.wrench.receipt_delay - offset
+            )
             findings = times.findings(with_recording(checked, **{role: stream}))
             words = [finding.what for finding in findings if finding.about == "clock"]
             assert len(words) == message and all(f"{offset:+.3f} s" in what for what in words)

@@ -127,5 +127,5 @@ def test_what_is_said_to_touch_the_lens_is_nowhere(cloud) -> None:
     close = View(view.recording, replace(view.geometry, camera=there), view.scene, strand.END)
     depth = np.full((480, 640), 0.2, np.float32)
     depth[::40, ::40] = 0.003
-    frame = close.frame_of(0, depth, view.color(0))
+    frame = close.rgbd_frame(0, depth, view.color(0))
     assert not frame.near[frame.depth < 0.1].any() and frame.near.any()

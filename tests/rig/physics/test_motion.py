@@ -6,7 +6,7 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.params import Params
 from pipeline.params.lab import Dip
-from rig.draw import drawn
+from rig.draw import sampled
 from rig.physics.launch import launch
 from rig.physics.motion import OPEN, PULL, PULLED, HandMotion
 from rig.physics.world import string_of
@@ -93,5 +93,5 @@ def test_a_band_like_another_has_its_rubber_and_launches_but_other_draws(coarse:
     assert (rubber.relaxation == other.relaxation).all()
     landed = [launch(name, drawing, DRAW, 3) for name in ("band1", "band1_dip")]
     assert landed[0] == landed[1] and np.isfinite(landed[0].landing_y)
-    forces = [drawn(drawing, name).rig.pads.force for name in ("band1", "band1_dip")]
+    forces = [sampled(drawing, name).rig.pads.force for name in ("band1", "band1_dip")]
     assert forces[0] != forces[1]

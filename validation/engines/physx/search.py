@@ -25,7 +25,7 @@ from pipeline.base.machine import devices
 from pipeline.identify.identify import evaluations_of
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.loss import TERMS
-from pipeline.identify.objective.session import service
+from pipeline.identify.objective.session import logging_evaluator
 from pipeline.identify.results.mounting import sling_of_method
 from pipeline.identify.search.evaluations import Evaluations
 from pipeline.identify.search.explore import rollouts_of
@@ -64,7 +64,7 @@ class Comparison:
         """Everything that was evaluated, and the seconds that it took (less what was recalled)."""
         optimizer = self.params.optimizer
         total = rollouts_of(self.params, engine) + optimizer.cma_rollouts  # a multistart
-        evaluate = service("search", self.band, engine, self.params, total)
+        evaluate = logging_evaluator("search", self.band, engine, self.params, total)
         began = time.perf_counter()
         evaluations = evaluations_of(self.params, engine, evaluate)
         return evaluations, time.perf_counter() - began
@@ -73,7 +73,7 @@ class Comparison:
         """Terms of the loss of thetas (N, 5) by engine; None where one failed."""
         unit, rows = self.box.to_unit(thetas), {}
         for engine in (OURS, PHYSX):
-            done = service("losses", self.band, engine, self.params, len(unit))(unit)
+            done = logging_evaluator("losses", self.band, engine, self.params, len(unit))(unit)
             rows[engine] = [
                 {"total": done.total[i], "failure": done.failure[i]}
                 | {name: done.terms[name][i] for name in TERMS}

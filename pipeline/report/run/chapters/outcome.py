@@ -16,7 +16,7 @@ from pipeline.report.run.tables.landings import LAUNCHED, of_kind
 def outcome(report: Report) -> str:
     """The first chapters."""
     results, params, main = report.results, report.params, report.main
-    table = tables.outcome(results, report.references, report.styles)
+    table = tables.outcome_table(results, report.references, report.styles)
     recorded = [b for b in results.methods if params.bands[b].source == "recording"]
     trials = {band: methods[main].trials for band, methods in results.methods.items()}
     trials |= {band: dip.trials for band, dip in results.dips.items()}

@@ -24,7 +24,7 @@ from pipeline.report.run.tables.landings import (
 VALUES = "youngs_modulus", "mooney_share", "relaxation", "damping_product"
 
 
-def outcome(results: Results, references: tuple[str, ...], styles: Styles) -> Table | None:
+def outcome_table(results: Results, references: tuple[str, ...], styles: Styles) -> Table | None:
     """Landing errors of the main method and the paper's, and how the main method predicts.
 
     Args:

@@ -8,7 +8,7 @@ import pytest
 from pipeline.report.drawing.styles import styles
 from pipeline.report.run.results import InformativePull
 from pipeline.report.run.tables.cells import NONE
-from pipeline.report.run.tables.outcome import outcome, values
+from pipeline.report.run.tables.outcome import outcome_table, values
 from tests.report.run.conftest import confidence
 from tests.report.run.tables.toy_results import floor, launches, result, results
 
@@ -28,7 +28,7 @@ def test_a_row_a_band_with_errors_predictions_and_failures() -> None:
         result("band1", THEIRS, launches([[0.1] * 5] * 3, failed=15)),
         floors={"band1": floor((0.01,) * 3, (0.01,) * 3)},
     )
-    heads, (row,) = outcome(ran, (MAIN, THEIRS), NAMED)
+    heads, (row,) = outcome_table(ran, (MAIN, THEIRS), NAMED)
     assert dict(zip(heads, row, strict=True)) == {
         "band": "band1",
         "launches": "6 virtual",
@@ -50,7 +50,9 @@ def test_the_pull_with_a_dip_has_a_row_below_its_band() -> None:
         floors={"band1": floor((0.01,) * 3, (0.01,) * 3)},
     )
     dip = InformativePull("band1", launches([[0.01, -0.01]] * 3))
-    heads, (first, second) = outcome(replace(ran, dips={"band1_dip": dip}), (MAIN, THEIRS), NAMED)
+    heads, (first, second) = outcome_table(
+        replace(ran, dips={"band1_dip": dip}), (MAIN, THEIRS), NAMED
+    )
     summary = dict(zip(heads, second, strict=True))
     assert first[0] == "band1" and second[0] == "band1, pull with dips"
     assert (summary["ours [cm]"], summary["Sling2Sim2Real [cm]"]) == ("1.0", NONE)
@@ -59,14 +61,14 @@ def test_the_pull_with_a_dip_has_a_row_below_its_band() -> None:
 
 def test_measured_launches_without_a_target_have_predictions_alone() -> None:
     plain = launches([[0.0]], "measured", targets=[2.0]).assign(target=math.nan, predicted_y=1.9)
-    heads, (row,) = outcome(results(result("mine", MAIN, plain)), (MAIN,), NAMED)
+    heads, (row,) = outcome_table(results(result("mine", MAIN, plain)), (MAIN,), NAMED)
     assert heads == ["band", "launches", "prediction off by [%]", "bias [%]"]
     assert row == ["mine", "1 measured", "5.0", "-5.0"]
 
 
 def test_no_launch_is_no_table() -> None:
     nothing = launches([[math.nan]] * 3, "predicted")
-    assert outcome(results(result("mine", MAIN, nothing)), (MAIN,), NAMED) is None
+    assert outcome_table(results(result("mine", MAIN, nothing)), (MAIN,), NAMED) is None
 
 
 def test_values_of_a_band_with_and_without_intervals() -> None:

@@ -7,7 +7,8 @@ each tetrahedron,
 
 with Lame's mu and lam and the rotation R in F. It is stiffer than rubber when stretched, so that
 Young's modulus is scaled until a straight string of it holds as the calibrated simulation does.
-Where PhysX is at hand, modulus and mass are then matched in it (GROUP).
+Where PhysX is at hand, modulus, mass, rest length and the clamps' height are then matched in it
+(GROUP).
 
 The stage opens with the straight band at rest: a volume whose `points` are bent while it is opened
 collapses across in PhysX (reports/validation/export-usd-causes.json), and holds too little. So the
@@ -63,6 +64,21 @@ class UsdBand:
     friction: float
 
     @property
+    def mass(self) -> float:
+        """Mass, with what is in the clamps [kg]."""
+        return float(self.tube.mass.sum())
+
+    @property
+    def rest_length(self) -> float:
+        """Length at rest between the clamps [m]."""
+        return float(np.ptp(self.tube.rest[1:-1, 0, 0]))
+
+    @property
+    def height(self) -> float:
+        """Height of the clamps above the origin [m]."""
+        return float(self.tube.clamped[[1, -2], 0, 2].mean())
+
+    @property
     def ends(self) -> np.ndarray:
         """Nodes in the clamps, shape (E,)."""
         return self._rows[[0, 1, -2, -1]].ravel()
@@ -106,9 +122,8 @@ def to_usd(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict
     poisson = theta["poissons_ratio"]
     unit = np.pi * model.band.diameter**2 / 4 * nominal(stretch, poisson)
     tube = Tube.of(model.sling, EDGES, GRADING)
-    weighed = float(tube.mass.sum())
     on_paper = float(np.sum(tension / unit) / len(draws))
-    band = UsdBand(tube, on_paper, poisson, theta["dynamic_friction"])
+    band = start = UsdBand(tube, on_paper, poisson, theta["dynamic_friction"])
     match = match_of("usd")
     done = match and match(model, band)
     if done:
@@ -132,10 +147,13 @@ def to_usd(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict
         "replayed": done is not None,
         "matched": [
             {"name": "youngs_modulus", "value": rounded(band.young, 6), "unit": "Pa"},
-            {"name": "mass", "value": rounded(float(band.tube.mass.sum()), 6), "unit": "kg"},
+            {"name": "mass", "value": rounded(band.mass, 6), "unit": "kg"},
+            {"name": "rest_length", "value": rounded(band.rest_length, 6), "unit": "m"},
+            {"name": "clamp_height", "value": rounded(band.height, 6), "unit": "m"},
         ],
         "factor_on_youngs_modulus": rounded(band.young / theta["youngs_modulus"], 4),
-        "factor_on_mass": rounded(float(band.tube.mass.sum()) / weighed, 4),
+        "factor_on_mass": rounded(band.mass / start.mass, 4),
+        "factor_on_rest_length": rounded(band.rest_length / start.rest_length, 4),
         "tension_errors": [rounded(float(error)) for error in left],
         "stretches": [rounded(float(value), 4) for value in stretch],
         "time_step_s": 1 / RATE,
@@ -205,7 +223,7 @@ def text(band: UsdBand) -> str:
         "young": band.young,
         "poisson": band.poisson,
         "friction": band.friction,
-        "mass": band.tube.mass.sum(),
+        "mass": band.mass,
         "rest": _tuples(rest.reshape(-1, 3)),
         "tetrahedra": _tuples(band.tube.tetrahedra),
         "faces": _tuples(surface(band.tube.tetrahedra)),

@@ -1,32 +1,51 @@
-"""Match an exported band in PhysX: Young's modulus to the force held, the mass to the landings.
+"""Match an exported band in PhysX, to the forces held and the landings of the calibrated one.
 
-`sling export --to usd` calls it where PhysX and a GPU are there. PhysX's damping changes what the
-band holds; so the band has none, and would be too fast: the mass stands in for what a launch loses.
-Bands of nine pairs of modulus and mass are launched, three at once; errors are taken as linear in
-the logarithms of both, which fits them and averages over what PhysX scatters. Then the stage itself
-is launched, one draw after the other: those of the match, and three that took no part.
+`sling export --to usd` calls it where PhysX and a GPU are there. Four values are matched, in two
+rounds of bands that are launched many at once; errors are taken as linear in them, which averages
+over what PhysX scatters:
+
+- Young's modulus, to the force held;
+- the mass. PhysX's damping changes what the band holds; so the band has none, and would be too
+  fast: the mass stands in for what a launch loses;
+- the rest length, by which the force grows otherwise with the draw: PhysX's law is another;
+- how high the clamps lie. PhysX's coarse steps let go later, and gravity turns a launch down.
+
+Then the stage itself is launched, one draw after the other, and corrected by its own errors there:
+those of the draws of the match. Three draws that took no part are launched last.
 """
 
 from __future__ import annotations
 
 import os
+import sys
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 import warp as wp
+from scipy.optimize import lsq_linear
 
 from pipeline.base.errors import UserError
 from pipeline.export import usd
 from pipeline.export.band import CalibratedBand
-from pipeline.export.match import HOLD, LANDING, compared, proof_draws
-from pipeline.export.usd import ITERATIONS, RATE, UsdBand, UsdMatch, near_draws
+from pipeline.export.match import HOLD, LANDING, LOST, compared, proof_draws
+from pipeline.export.mesh import Tube
+from pipeline.export.replay import Shot
+from pipeline.export.usd import EDGES, GRADING, ITERATIONS, RATE, UsdBand, UsdMatch, near_draws
 from pipeline.simulator.launch import Launches
 from validation.engines.physx import scene
 from validation.engines.physx.bands import INTERPRETER, Engine, release
 from validation.engines.physx.exported import launched, yielded
 
-ROUNDS = (0.08, 0.25), (0.04, 0.10)  # logarithms of modulus and mass to both sides, each round
-FARTHEST = 0.5  # of either logarithm from where the match begins
+# Logarithms of modulus, mass and rest length; the clamps' height [m].
+WIDTHS = np.array([0.08, 0.25, 0.03, 0.01])  # to both sides, in the first round
+FARTHEST = np.array([0.5, 1.0, 0.1, 0.03])  # from where the match begins
+ROUNDS = 1.0, 0.5  # of WIDTHS
+CORRECTIONS = 2  # by the errors of the stage itself
+LONGEST = 300.0  # s, after which nothing more is tried
+ONE_BY_ONE = np.concatenate([np.zeros((1, 4)), np.eye(4)[1:], -np.eye(4)[1:]])  # a mesh each
+SCENES = ONE_BY_ONE[:, None] + np.outer([-1, 0, 1], np.eye(4)[0])  # in each three moduli, (7, 3, 4)
 
 
 def matched(model: CalibratedBand, band: UsdBand) -> UsdMatch | None:
@@ -43,68 +62,135 @@ def matched(model: CalibratedBand, band: UsdBand) -> UsdMatch | None:
     if not wp.is_cuda_available():
         return None
     with Engine() as engine:
-        best = fitted(engine, model, band)
+        best, shots = fitted(engine, model, band)
         (near, _), others = near_draws(model), proof_draws(model)
-        match, proof, on_paper = (
-            compared(model, draws, _launched_singly(engine, model, same, draws))
-            for same, draws in ((best, near), (best, others), (band, others))
+        proof, on_paper = (
+            compared(model, others, _launched_singly(engine, model, same, others))
+            for same in (best, band)
         )
+    match = compared(model, near, shots)
     return UsdMatch(best, match, proof, on_paper, f"PhysX (ovphysx {version})")
 
 
-def fitted(engine: Engine, model: CalibratedBand, band: UsdBand) -> UsdBand:
-    """Modulus and mass of which `near_draws` are held and land as in the calibrated simulation."""
-    (draws, ours), point = near_draws(model), np.zeros(2)
-    for widths in ROUNDS:
-        grid = point + np.array(
-            [[side * widths[0], other * widths[1]] for other in (-1, 0, 1) for side in (-1, 0, 1)]
-        )
-        errors = np.concatenate(
-            [_errors(engine, model, band, draws, ours, same) for same in np.split(grid, 3)]
-        )
-        point = np.clip(_least(grid, errors), -FARTHEST, FARTHEST)
-    return changed(band, point)
+def fitted(
+    engine: Engine, model: CalibratedBand, band: UsdBand, *, corrections: int = CORRECTIONS
+) -> tuple[UsdBand, list[Shot]]:
+    """The band of which `near_draws` are held and land as in the calibrated simulation.
+
+    Returns:
+        It, and the shots of its stage from those draws.
+    """
+    (draws, ours), point, say = near_draws(model), np.zeros(4), _clock(model.band.name)
+    slopes = np.empty((0, 4))
+    for number, share in enumerate(ROUNDS, 1):
+        if number > 1 and say(f"round {number - 1} of {len(ROUNDS)}", point) > LONGEST:
+            break
+        grids = point + share * WIDTHS * SCENES
+        errors = []
+        for i, grid in enumerate(grids, 1):
+            errors.append(_errors(engine, model, band, draws, ours, grid))
+            say(f"round {number}, scene {i} of {len(grids)}")
+        constant, slopes = _linear(np.concatenate(grids), np.concatenate(errors))
+        point = _least(constant, slopes)
+    tried = []
+    for number in range(corrections + 1):
+        same = changed(model, band, point)
+        shots = _launched_singly(engine, model, same, draws)
+        left = _relative(shots, ours)
+        size = np.linalg.norm(np.nan_to_num(left, nan=LOST / LANDING))
+        tried.append((float(size), same, shots))
+        if say(f"stage {number + 1}, {_worst(shots, ours)}", point) > LONGEST:
+            break
+        point = _least(left - slopes @ point, slopes)
+    return min(tried, key=lambda trial: trial[0])[1:]
 
 
-def changed(band: UsdBand, point: np.ndarray) -> UsdBand:
-    """The band with modulus and mass times e to `point` (2,)."""
-    young, mass = np.exp(point)
-    tube = replace(band.tube, mass=mass * band.tube.mass)
-    return replace(band, tube=tube, young=young * band.young)
+def changed(model: CalibratedBand, band: UsdBand, point: np.ndarray) -> UsdBand:
+    """The band with modulus, mass, rest length times e to point[:3], clamps raised by the last."""
+    young, mass, length = np.exp(point[:3])
+    sling = replace(model.sling, rest_length=length * model.sling.rest_length)
+    tube = Tube.of(sling, EDGES, GRADING)
+    up = np.array([0.0, 0.0, point[3]])
+    moved = {"hanging": tube.hanging + up, "clamped": tube.clamped + up}
+    return replace(
+        band, tube=replace(tube, mass=mass * tube.mass, **moved), young=young * band.young
+    )
 
 
-def _least(grid: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Where a linear model of errors (P, R) at points (P, 2) is least, in their squares."""
+def _linear(grid: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A linear model of errors (P, R) at points (P, K): at the origin (R,), and slopes (R, K).
+
+    Not a number for an error that is lost at a point.
+    """
     terms = np.column_stack([np.ones(len(grid)), grid])
     sound = np.isfinite(errors).all(axis=0)
     if not sound.any():
         raise UserError("PhysX: no draw of the match lands; the stage is not matched")
-    model = np.linalg.lstsq(terms, errors[:, sound], rcond=None)[0]
-    return np.linalg.lstsq(model[1:].T, -model[0], rcond=None)[0]
+    model = np.full((terms.shape[1], errors.shape[1]), np.nan)
+    model[:, sound] = np.linalg.lstsq(terms, errors[:, sound], rcond=None)[0]
+    return model[0], model[1:].T
+
+
+def _least(constant: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Where errors (R,) + slopes (R, K) point are least in their squares, within FARTHEST.
+
+    Beside them stands the way from the origin, of FARTHEST, so that nothing goes far for nothing.
+    """
+    sound = np.isfinite(constant) & np.isfinite(slopes).all(axis=1)
+    rows = np.concatenate([slopes[sound], np.diag(1 / FARTHEST)])
+    wanted = np.concatenate([-constant[sound], np.zeros(len(FARTHEST))])
+    return lsq_linear(rows, wanted, (-FARTHEST, FARTHEST)).x
 
 
 def _errors(
     engine: Engine, model: CalibratedBand, band: UsdBand, draws, ours: Launches, grid: np.ndarray
 ) -> np.ndarray:
-    """Errors over what is asked, of forces and landings, at points (P, 2) of one mass: (P, 2 N)."""
+    """Errors of forces and landings, at points (P, 4) of one mesh: (P, 2 N)."""
     count = len(draws)
-    heavy = changed(band, np.array([0.0, grid[0, 1]]))
+    same = changed(model, band, grid[0])
     youngs = np.repeat(band.young * np.exp(grid[:, 0]), count)
     thetas = np.column_stack(
         [youngs, *(np.full(len(youngs), x) for x in (band.poisson, 0.0, band.friction, 1.0))]
     )
-    stage = scene.text(heavy.tube, thetas, RATE, ITERATIONS)
+    stage = scene.text(same.tube, thetas, RATE, ITERATIONS)
     shots = launched(
-        engine, stage, heavy, model.sling, model.launch_setup,
+        engine, stage, same, model.sling, model.launch_setup,
         np.tile(_places(model, draws, ours), (len(grid), 1)),
         offsets=scene.offsets(len(youngs)), youngs=youngs,
     )  # fmt: skip
-    there = np.array([[shot.hold_force, shot.landing] for shot in shots]).reshape(-1, count, 2)
+    starts = range(0, len(shots), count)
+    return np.array([_relative(shots[start : start + count], ours) for start in starts])
+
+
+@np.errstate(all="ignore")  # what does not land
+def _relative(shots: Sequence[Shot], ours: Launches) -> np.ndarray:
+    """Logarithms of forces and landings over ours, of what is asked, shape (2 N,)."""
+    there = np.array([[shot.hold_force, shot.landing] for shot in shots])
     wanted = np.column_stack([ours.hold_force, ours.landing_y])
-    return ((there / wanted - 1) / [HOLD, LANDING]).reshape(len(grid), -1)
+    return (np.log(there / wanted) / [HOLD, LANDING]).ravel()
 
 
-def _launched_singly(engine: Engine, model: CalibratedBand, band: UsdBand, draws: np.ndarray):
+def _worst(shots: Sequence[Shot], ours: Launches) -> str:
+    force, landing = np.abs(_relative(shots, ours).reshape(-1, 2)).max(axis=0) * [HOLD, LANDING]
+    return f"at most {100 * force:.1f} % of a force and {100 * landing:.1f} % of a landing off"
+
+
+def _clock(name: str) -> Callable[..., float]:
+    """Something that says how far the match of a band is, and returns the seconds that it took."""
+    began = time.monotonic()
+
+    def say(what: str, point: np.ndarray | None = None) -> float:
+        passed = time.monotonic() - began
+        at = "" if point is None else f"; modulus, mass, length, height {np.round(point, 4)}"
+        print(f"{name} in PhysX, {passed:.0f} s: {what}{at}", file=sys.stderr, flush=True)
+        return passed
+
+    return say
+
+
+def _launched_singly(
+    engine: Engine, model: CalibratedBand, band: UsdBand, draws: np.ndarray
+) -> list[Shot]:
     """Shots of the written stage, each from draw (N, 2) of its own."""
     places = _places(model, draws, model.launches(draws))
     stage = usd.text(band)

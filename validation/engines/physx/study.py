@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -232,7 +233,7 @@ def pulls(bench: Bench, engine: Engine) -> list[Measure]:
     return measures
 
 
-def speeds(bench: Bench, engine: Engine) -> list[dict]:
+def speeds(bench: Bench, engine: Engine, counts: Sequence[int] = ENVIRONMENTS) -> list[dict]:
     """Rollouts a second of the yardstick of `sling bench`, PhysX's and ours on one device.
 
     A rollout of PhysX is the hold, loading the scene anew at the release, and the free flight.
@@ -244,7 +245,7 @@ def speeds(bench: Bench, engine: Engine) -> list[dict]:
     rate, iterations = SETTINGS[0]
     course = phases(tube, episode, rate, marked=False)
     entries = []
-    for count in ENVIRONMENTS:
+    for count in counts:
         thetas = np.tile(checks.THETA, (count, 1))
         _, held, free = engine.simulate(tube, thetas, course, rate=rate, iterations=iterations)
         parameters = checks.damped(thetas)

@@ -110,7 +110,7 @@ def simulate(physx, folder: Path) -> None:
         )
         flags = np.ones((*place.shape[:2], 1))
         flags[:, vertices] = 0.0
-        drive = np.concatenate([place, flags], axis=2)
+        drive = np.concatenate([place, flags], axis=2, dtype=np.float32)
         begin = place[:, vertices] - offset - targets[0]
         targets = np.broadcast_to(targets, (len(fade), *targets.shape[1:]))
         retained = []

@@ -36,28 +36,58 @@ def held(model, band) -> np.ndarray:
 
 
 def test_a_soft_band_is_stiffened_until_it_holds(model, band) -> None:
-    fitted = match.fitted(StringEngine(band.tube), model, band)
+    fitted, shots = match.fitted(StringEngine(band.tube), model, band)
     before, after = held(model, band), held(model, fitted)
     assert before.mean() < -0.1 and abs(after.mean()) < 0.03
     assert np.abs(after).max() < np.abs(before).max() / 3
     assert fitted.young > 1.1 * band.young and fitted.poisson == band.poisson
+    assert shots == match._launched_singly(
+        StringEngine(band.tube), model, fitted, near_draws(model)[0]
+    )
 
 
-def test_modulus_and_mass_change_by_their_logarithms(band) -> None:
-    other = match.changed(band, np.log([1.2, 0.8]))
+def test_what_a_stage_alone_does_otherwise_is_corrected(model, band, monkeypatch) -> None:
+    """A band pulls a tenth less where it is the only one of its scene."""
+
+    def force_on(tube, sections, nodes, *rest, **more) -> np.ndarray:
+        return (0.9 if len(nodes) == 1 else 1.0) * strings.force_on(
+            tube, sections, nodes, *rest, **more
+        )
+
+    monkeypatch.setattr(flight, "force_on", force_on)
+    rough, corrected = (
+        held(model, match.fitted(StringEngine(band.tube), model, band, corrections=count)[0])
+        for count in (0, match.CORRECTIONS)
+    )
+    assert rough.mean() < -0.08 and abs(corrected.mean()) < abs(rough.mean()) / 5
+    assert np.abs(corrected).max() < np.abs(rough).max() / 2
+
+
+def test_each_value_changes_by_its_own(model, band) -> None:
+    other = match.changed(model, band, np.append(np.log([1.2, 0.8, 1.05]), 0.01))
     assert other.young == pytest.approx(1.2 * band.young)
-    assert other.tube.mass == pytest.approx(0.8 * band.tube.mass)
+    assert other.rest_length == pytest.approx(1.05 * band.rest_length)
+    assert other.mass / band.mass == pytest.approx(0.8, rel=5e-3)  # more of it is in the clamps
+    assert other.height == pytest.approx(0.01) and band.height == pytest.approx(0, abs=1e-9)
+    assert other.tube.clamped[0] == pytest.approx(band.tube.clamped[0] + [0, 0, 0.01])
 
 
 def test_the_least_of_a_linear_model_is_found_and_lost_draws_do_not_count() -> None:
-    grid = np.array([[x, y] for x in (-0.1, 0, 0.1) for y in (-0.2, 0, 0.2)])
-    best = np.array([0.07, -0.12])
-    errors = (grid - best) @ np.array([[1.0, 0.0], [2.0, -0.5], [0.3, 0.3]]).T
-    assert match._least(grid, errors) == pytest.approx(best)
+    grid = np.concatenate([side * np.eye(4) for side in (-0.02, 0.0, 0.02)])
+    best = np.array([0.07, -0.12, 0.03, 0.01])
+    slopes = 1e4 * (np.eye(6, 4) + 0.1)
+    errors = (grid - best) @ slopes.T
+    assert match._least(*match._linear(grid, errors)) == pytest.approx(best, abs=1e-6)
     lost = np.column_stack([errors, np.full(len(grid), np.nan)])
-    assert match._least(grid, lost) == pytest.approx(best)
+    assert match._least(*match._linear(grid, lost)) == pytest.approx(best, abs=1e-6)
     with pytest.raises(UserError, match="no draw of the match lands"):
-        match._least(grid, np.full((9, 2), np.nan))
+        match._linear(grid, np.full((12, 2), np.nan))
+
+
+def test_what_no_error_tells_stays_where_it_was() -> None:
+    slopes = np.array([[50.0, 0.0, 0.0, 0.0]])
+    assert match._least(np.array([1.0]), slopes) == pytest.approx([-0.02, 0, 0, 0], rel=1e-2)
+    assert match._least(np.array([1e3]), slopes)[0] == pytest.approx(-match.FARTHEST[0])
 
 
 def test_without_physx_or_a_gpu_there_is_no_match(model, band, monkeypatch) -> None:

@@ -101,9 +101,7 @@ def flowing(stress: np.ndarray, step: float, pause: float, rate: np.ndarray | fl
     return flowed(result, pause, rate)
 
 
-def flowed(
-    overstress: np.ndarray | float, time: float, rate: np.ndarray | float
-) -> np.ndarray | float:
+def flowed(overstress: np.ndarray, time: float, rate: np.ndarray | float) -> np.ndarray:
     """What is left of an overstress, over the shear modulus, that flows for a time [s]: exactly."""
     passed = FLOW_POWER * time * rate * np.abs(overstress / 3) ** FLOW_POWER
     return overstress * (1 + passed) ** (-1 / FLOW_POWER)

@@ -124,7 +124,7 @@ class PullDesign:
         sling = ClampedBand.of(params.bands[band], params.setup, params.sling, law=RUBBER)
         coordinates = Coordinates.of_method(params, method, sling)
         rng = np.random.default_rng(params.optimizer.seed)
-        phi, precision = drawn(coordinates, DRAWS, rng)
+        phi, precision = sampled(coordinates, DRAWS, rng)
         young = coordinates.names.index(LOGS[0])
         history = LaunchHistory(*times, deepest=float(np.hypot(*draw)))
         phi[:, young] = np.log(modulus(sling, coordinates, phi, draw, force, history))
@@ -194,7 +194,7 @@ class PullDesign:
         return progress
 
 
-def drawn(
+def sampled(
     coordinates: Coordinates, count: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
     """Prior draws (count, D) within the bounds, and the precision of each coordinate (D,).

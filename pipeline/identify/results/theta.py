@@ -1,10 +1,12 @@
 """θ files: the identified parameters of a band as JSON, or the same written by hand.
 
 {"band": "...", "theta": {"youngs_modulus": ..., ... all five}}  is of the neo-Hookean law; with
-"law": "rubber", θ has its parameters too and "history" {"pull_time", "pause"} says in how many
-seconds the recording's hand drew the band and how long it waited. Where a stage wrote it, also
-"method", "nuisances": {"air_drag": ...}, "turn_damping", "returned_share", "loss":
-{"geom", "force", "work", "total"}, "rollouts", "confidence"; "mounted": false where the method
+"law": "rubber", θ has its parameters too and "history" {"pull_time", "pause", "deepest"} says in
+how many seconds the recording's hand drew the band, how long it waited [s], and how far the band
+had ever been drawn [m]. Where a stage wrote it, also "method", "nuisances": {"air_drag": ...},
+"turn_damping", "returned_share", "loss": {"geom", "force", "work", "total"}, "rollouts" and how
+many of them "failed", by which phase, generation and solver it was "found", "confidence";
+"mounted": false where the method
 leaves out the calibration of the clamps; "made_with": the settings of params.yaml that it rests on
 (params/provenance.py). What is read of "confidence": confidence.py.
 

@@ -53,7 +53,7 @@ def small() -> PullDesign:
 def test_prior_draws_have_the_priors_distributions(small) -> None:
     coordinates: Coordinates = small.coordinates
     assert "softening" in coordinates.names
-    phi, precision = design.drawn(coordinates, 500, np.random.default_rng(1))
+    phi, precision = design.sampled(coordinates, 500, np.random.default_rng(1))
     assert np.all(phi >= coordinates.low) and np.all(phi <= coordinates.high)
     place = coordinates.names.index
     mean, spread = PRIORS["softening"]

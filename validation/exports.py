@@ -1,8 +1,9 @@
 """`python -m validation.exports [--to newton] [BAND...]`: reports/validation/export-<target>.json.
 
 Each band that a run has identified is exported to MuJoCo or Newton and replayed there, on the CPU
-(Newton on what SLING_DEVICE names); or to PhysX, on a GPU. On several GPUs each has a band of its
-own. The report is written anew after each band, so that one that was killed has those before.
+(Newton also on the GPU that SLING_DEVICE names: export-newton-gpu.json); or to PhysX, on a GPU. On
+several GPUs each has a band of its own. The report is written anew after each band, so that one
+that was killed has those before.
 """
 
 from __future__ import annotations
@@ -45,9 +46,10 @@ def main() -> None:
     args, cards = parser.parse_args(), {}
     target, (packages, arguments) = args.to, TARGETS[args.to]
     device = {"mjcf": "cpu", "newton": devices()[0], "usd": "cuda:0"}[target]
-    bands = args.bands or list(load().run.bands)
+    name = f"{target}-gpu" if target == "newton" and device != "cpu" else target
+    path, bands = Path(REPORT.format(name)), args.bands or list(load().run.bands)
     versions = {name: version(name) for name in packages}
-    for band, card in _cards(target, bands):
+    for band, card in _cards(target, bands, device):
         cards[band] = {name: card[name] for name in KEPT if name in card}
         print(f"{band}: {'met' if card['met'] else 'NOT met'}", flush=True)
         content = {
@@ -55,24 +57,23 @@ def main() -> None:
             "met": len(cards) == len(bands) and all(row["met"] for row in cards.values()),
             "bands": {name: cards[name] for name in bands if name in cards},
         }
-        write_report(
-            Path(REPORT.format(target)), content, arguments, device=device, versions=versions
-        )
+        write_report(path, content, arguments, device=device, versions=versions)
 
 
-def _cards(target: str, bands: list[str]) -> Iterator[tuple[str, dict]]:
+def _cards(target: str, bands: list[str], device: str) -> Iterator[tuple[str, dict]]:
     """Export the bands, on all GPUs; a band and its card, as soon as it is made."""
-    several = gpus() if target == "usd" else ()
-    if len(several) < 2:
+    places = [0] if device == "cpu" else list(range(len(gpus())))
+    if target == "newton" and device != "cpu":
+        places *= len(bands)  # its steps are short: they wait for Python, not for the GPU
+    places = places[: len(bands)]
+    if len(places) < 2:
         yield from ((band, exported(target, band)) for band in bands)
         return
     context = get_context("spawn")
     free = context.Queue()
-    for number in range(len(several)):
+    for number in places:
         free.put(number)
-    with ProcessPoolExecutor(
-        min(len(several), len(bands)), context, initializer=_take_gpu, initargs=(free,)
-    ) as pool:
+    with ProcessPoolExecutor(len(places), context, initializer=_take_gpu, initargs=(free,)) as pool:
         started = {pool.submit(exported, target, band): band for band in bands}
         ended = list[Future]()
         for done in as_completed(started):

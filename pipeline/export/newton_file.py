@@ -6,6 +6,7 @@ from inspect import getfile
 from pathlib import Path
 
 from pipeline.base.files import write_json, write_text
+from pipeline.base.machine import devices
 from pipeline.episode.episode import Episode
 from pipeline.export import card
 from pipeline.export.band import CalibratedBand
@@ -15,7 +16,7 @@ from pipeline.export.proof import proven
 
 
 def to_newton(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
-    """<band>.json and newton_band.py, proven by a replay on the CPU.
+    """<band>.json and newton_band.py, proven by a replay on the first device of SLING_DEVICE.
 
     The chain is matched in MuJoCo, which steps the same springs the same way. All that is said
     about it is measured in Newton.
@@ -26,7 +27,7 @@ def to_newton(model: CalibratedBand, folder: Path, episode: Episode | None) -> d
     path = folder / f"{name}.json"
     write_json(path, numbers(name, chain, proof))
     write_text(folder / source.name, source.read_text("utf-8"))
-    done = proven(model, NewtonReplay(chain), proof, episode)
+    done = proven(model, NewtonReplay(chain, devices()[0]), proof, episode)
     files = {
         path.name: "the numbers",
         source.name: "builds and launches the band",

@@ -34,21 +34,26 @@ def numbers(name: str, chain: SpringChain, draws: np.ndarray) -> dict:
 
 
 class NewtonReplay:
-    """A chain in Newton, on the CPU. Raises UserError where Newton is not installed."""
+    """A chain in Newton. Raises UserError where Newton is not installed.
 
-    def __init__(self, chain: SpringChain):
-        self.chain, self._module = chain, loader()
-        self.engine = f"Newton {version('newton')}, Warp {version('warp-lang')}, CPU"
+    Attributes:
+        device: As Warp names it.
+    """
+
+    def __init__(self, chain: SpringChain, device: str = "cpu"):
+        self.chain, self._module, self.device = chain, loader(), device
+        place = "CPU" if device == "cpu" else "GPU"
+        self.engine = f"Newton {version('newton')}, Warp {version('warp-lang')}, {place}"
         self._numbers = numbers("band", chain, np.empty((0, 2)))
 
     @property
     def finer(self) -> NewtonReplay:
         """The same replay with half the time step."""
-        return NewtonReplay(replace(self.chain, step=self.chain.step / 2))
+        return NewtonReplay(replace(self.chain, step=self.chain.step / 2), self.device)
 
     def launches(self, draws: np.ndarray, *, fly: bool = True) -> list[Shot]:
         """All at once, as ChainReplay.launches; Newton always flies them."""
-        bands = self._module.SpringBands(self._numbers, len(draws))
+        bands = self._module.SpringBands(self._numbers, len(draws), self.device)
         hold_force = bands.draw(draws)
         landing, left = bands.launch()
         speed, angle = np.linalg.norm(left, axis=1), np.arctan2(left[:, 2], left[:, 1])
@@ -57,7 +62,8 @@ class NewtonReplay:
 
     def pull(self, path: HandPath, times: np.ndarray, stamps: np.ndarray) -> Pulled:
         """Pull as ChainReplay.pull does."""
-        bands, middle = self._module.SpringBands(self._numbers), self.chain.edges // 2
+        bands = self._module.SpringBands(self._numbers, device=self.device)
+        middle = self.chain.edges // 2
         bands.put([self.chain.hanging()], held=False)
         bands.settle(HANG)
         bands.put(bands.lines, loaded=False)

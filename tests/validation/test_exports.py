@@ -53,7 +53,7 @@ def test_each_gpu_has_a_band_of_its_own(monkeypatch) -> None:
     monkeypatch.setattr(exports, "gpus", lambda: ("cuda:0", "cuda:1"))
     monkeypatch.chdir(ROOT)
     with pytest.raises(UserError):
-        list(exports._cards("usd", ["no_such_band", "nor_this"]))
+        list(exports._cards("usd", ["no_such_band", "nor_this"], "cuda:0"))
 
 
 def test_a_process_sees_its_gpu_alone(monkeypatch) -> None:

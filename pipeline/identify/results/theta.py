@@ -6,9 +6,9 @@ how many seconds the recording's hand drew the band, how long it waited [s], and
 had ever been drawn [m]. Where a stage wrote it, also "method", "nuisances": {"air_drag": ...},
 "turn_damping", "returned_share", "loss": {"geom", "force", "work", "total"}, "rollouts" and how
 many of them "failed", by which phase, generation and solver it was "found", "confidence";
-"mounted": false where the method
-leaves out the calibration of the clamps; "made_with": the settings of params.yaml that it rests on
-(params/provenance.py). What is read of "confidence": confidence.py.
+"mounted": false where the method leaves out the calibration of the clamps; "made_with": the
+settings of params.yaml that it rests on (params/provenance.py). What is read of "confidence":
+confidence.py.
 
 What its confidence rests on, samples of θ, lies beside in data/confidence/.
 """

@@ -106,8 +106,10 @@ class PhysxLauncher:
             with replacing(path) as temporary:
                 temporary.write_text(content, "utf-8")
             print(f"{self.count} launches in PhysX, {self.seconds:.0f} s", flush=True)
-        known = json.loads(path.read_text("utf-8"))
-        return Launched(*(np.array(known[name]) for name in ("landing", "force")), known["failure"])
+        stored = json.loads(path.read_text("utf-8"))
+        return Launched(
+            *(np.array(stored[name]) for name in ("landing", "force")), stored["failure"]
+        )
 
     def _simulated(self, draws: np.ndarray) -> dict:
         force = self.ours(draws).hold_force

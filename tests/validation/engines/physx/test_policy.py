@@ -66,12 +66,12 @@ def test_one_that_was_killed_launches_nothing_twice(begun, tmp_path, monkeypatch
     with_theta(tmp_path)
     monkeypatch.setattr(policy, "launch_on_rig", lambda *of: SimpleNamespace(landing_y=np.nan))
     policy.main()
-    known = len(begun)
+    before = len(begun)
     csv = tmp_path / "landings.csv"
     csv.write_text("draw_y_m,draw_z_m,landing_y_m\n-0.35,-0.15,2.0\n-0.3,-0.2,1.5\n")
     monkeypatch.setattr(sys, "argv", ["policy", "band1", "--landings", str(csv)])
     policy.main()
-    assert begun[known:] == [2]  # the measured draws
+    assert begun[before:] == [2]  # the measured draws
     done = json.loads((tmp_path / policy.REPORT.format("band1")).read_text("utf-8"))
     assert [row["measured_m"] for row in done["measured"]] == [2.0, 1.5]
     assert done["errors"]["on_rig_m"] == {"mean_error_m": None, "launches": 6, "failed": 6}

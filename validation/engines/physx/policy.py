@@ -10,7 +10,8 @@ and, of a band of the rig, on the rig with the errors of its trials. Measured la
 in PhysX too.
 
 Writes reports/validation/physx-policy-<band>.json after each step. What PhysX launched stands in
-.checkpoints/physx-policy, so that a command that was killed goes on. Needs a GPU.
+.checkpoints/physx-policy, so that a command that was killed goes on. Needs a GPU, but for the
+rig, which `--rig` launches on any machine by the draws of the report.
 """
 
 from __future__ import annotations
@@ -27,24 +28,21 @@ import pandas as pd
 
 from pipeline.base import errors
 from pipeline.base.errors import UserError
-from pipeline.base.files import replacing
+from pipeline.base.files import replacing, write_json
 from pipeline.base.machine import cores, devices
 from pipeline.identify.results.mounting import load_sling
 from pipeline.launching.surface.landing_map import LandingMap, validation
 from pipeline.params import Params, load
-from pipeline.policy.check import check, figures, verdict
-from pipeline.policy.train import train
 from pipeline.simulator.launch import Launches, launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import THETA, Parameters
-from rig.physics.launch import launch as launch_on_rig
 from validation import orange
 from validation.engines.physx import study
 from validation.engines.physx.bands import Engine, release
 from validation.engines.physx.exported import yielded
 from validation.engines.physx.launches import alike, launch_in_physx
 from validation.engines.physx.rollouts import ITERATIONS, RATE
-from validation.reports import write_report
+from validation.reports import plain, write_report
 from validation.simulator.finding import Bench
 
 FOUND = "reports/validation/physx-{}.json"
@@ -106,8 +104,10 @@ class PhysxLauncher:
             with replacing(path) as temporary:
                 temporary.write_text(content, "utf-8")
             print(f"{self.count} launches in PhysX, {self.seconds:.0f} s", flush=True)
-        known = json.loads(path.read_text("utf-8"))
-        return Launched(*(np.array(known[name]) for name in ("landing", "force")), known["failure"])
+        stored = json.loads(path.read_text("utf-8"))
+        return Launched(
+            *(np.array(stored[name]) for name in ("landing", "force")), stored["failure"]
+        )
 
     def _simulated(self, draws: np.ndarray) -> dict:
         force = self.ours(draws).hold_force
@@ -145,6 +145,9 @@ def trained_policy(launcher: PhysxLauncher, params: Params, content: dict):
         "failed": int(np.isnan(landing_map.landing_y).sum()),
         "error": validation(landing_map, settings.targets),
     }
+    from pipeline.policy.check import check, figures, verdict  # PyTorch and rsl_rl
+    from pipeline.policy.train import train
+
     trained = train(landing_map.surface, settings)
     checked = check(trained.policy, launcher, params)
     content["training"] = figures(trained, checked)
@@ -153,12 +156,12 @@ def trained_policy(launcher: PhysxLauncher, params: Params, content: dict):
     return trained.policy
 
 
-def at_targets(policy, launcher: PhysxLauncher, params: Params, band: str) -> list[dict]:
-    """Where the policy's draws for the trials' targets land, in each simulator and on the rig."""
+def at_targets(policy, launcher: PhysxLauncher, params: Params) -> list[dict]:
+    """Where the policy's draws for the trials' targets land, in each simulator."""
     targets = np.array(params.trials.targets)
     draws = policy.draws(targets)
     there, ours = launcher(draws), launcher.ours(draws)
-    rows = [
+    return [
         {
             "target_m": target,
             "draw_m": draw,
@@ -170,14 +173,19 @@ def at_targets(policy, launcher: PhysxLauncher, params: Params, band: str) -> li
             targets, draws, there.landing_y, there.hold_force, ours.landing_y, strict=True
         )
     ]
-    if params.bands[band].source == "rig":
-        count = params.trials.repeats
-        for i, row in enumerate(rows):
-            numbers = range(i * count, (i + 1) * count)
-            row["on_rig_m"] = [
-                launch_on_rig(band, params, row["draw_m"], number).landing_y for number in numbers
-            ]
-    return rows
+
+
+def launched_on_rig(content: dict, params: Params) -> None:
+    """Launch the draws of `content` on the rig, with the errors of its trials."""
+    from rig.physics.launch import launch as launch_on_rig  # not on every machine with a GPU
+
+    count = params.trials.repeats
+    for i, row in enumerate(content["targets"]):
+        row["on_rig_m"] = [
+            launch_on_rig(content["band"], params, row["draw_m"], number).landing_y
+            for number in range(i * count, (i + 1) * count)
+        ]
+    content["errors"]["on_rig_m"] = mean_error(content["targets"], "on_rig_m", "target_m")
 
 
 def mean_error(rows: list[dict], name: str, wanted: str) -> dict:
@@ -195,12 +203,19 @@ def main() -> None:
     parser.add_argument("band")
     parser.add_argument("--params", default="params.yaml")
     parser.add_argument("--landings", help="CSV of measured launches of this band")
+    parser.add_argument("--rig", action="store_true", help="launch the report's draws there alone")
     requested = parser.parse_args()
     params, band = load(requested.params), requested.band
     if band == orange.NAME:
         params = orange.with_orange(params)
     if band not in params.bands:
         raise UserError(f"no band {band} in {requested.params}")
+    path = Path(REPORT.format(band))
+    if requested.rig:
+        content = json.loads(path.read_text("utf-8"))
+        launched_on_rig(content, params)
+        write_json(path, plain(content))
+        return
     theta, options = found(band), {"versions": {"ovphysx": release()}, "device": DEVICE}
     arguments = band + (" --landings CSV" if requested.landings else "")
     content = {
@@ -212,16 +227,17 @@ def main() -> None:
     }
 
     def write() -> None:
-        write_report(Path(REPORT.format(band)), content, arguments, **options)
+        write_report(path, content, arguments, **options)
 
     with Engine() as engine:
         launcher = PhysxLauncher(engine, load_sling(params, band), params, theta)
         policy = trained_policy(launcher, params, content)
         content["launches_in_physx"] = {"count": launcher.count, "seconds": launcher.seconds}
         write()
-        rows = content["targets"] = at_targets(policy, launcher, params, band)
-        names = [name for name in ("in_physx_m", "in_ours_m", "on_rig_m") if name in rows[0]]
-        content["errors"] = {name: mean_error(rows, name, "target_m") for name in names}
+        rows = content["targets"] = at_targets(policy, launcher, params)
+        content["errors"] = {
+            name: mean_error(rows, name, "target_m") for name in ("in_physx_m", "in_ours_m")
+        }
         write()
         if requested.landings:
             table = pd.read_csv(requested.landings)
@@ -235,6 +251,9 @@ def main() -> None:
         bench, counts = Bench(params, device=devices()[0]), study.ENVIRONMENTS[1:2]
         content["speeds"] = study.speeds(bench, engine, counts)
         content["met"] = study.fast_enough(content["speeds"]) and not content["failures"]
+        write()
+    if params.bands[band].source == "rig":
+        launched_on_rig(content, params)
         write()
 
 

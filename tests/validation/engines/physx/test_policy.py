@@ -64,17 +64,34 @@ def test_a_policy_is_trained_and_launched_there_in_ours_and_on_the_rig(begun, tm
 
 def test_one_that_was_killed_launches_nothing_twice(begun, tmp_path, monkeypatch) -> None:
     with_theta(tmp_path)
-    monkeypatch.setattr(policy, "launch_on_rig", lambda *of: SimpleNamespace(landing_y=np.nan))
+    lost = SimpleNamespace(landing_y=np.nan)
+    monkeypatch.setattr("rig.physics.launch.launch", lambda *of: lost)
     policy.main()
-    known = len(begun)
+    before = len(begun)
     csv = tmp_path / "landings.csv"
     csv.write_text("draw_y_m,draw_z_m,landing_y_m\n-0.35,-0.15,2.0\n-0.3,-0.2,1.5\n")
     monkeypatch.setattr(sys, "argv", ["policy", "band1", "--landings", str(csv)])
     policy.main()
-    assert begun[known:] == [2]  # the measured draws
+    assert begun[before:] == [2]  # the measured draws
     done = json.loads((tmp_path / policy.REPORT.format("band1")).read_text("utf-8"))
     assert [row["measured_m"] for row in done["measured"]] == [2.0, 1.5]
     assert done["errors"]["on_rig_m"] == {"mean_error_m": None, "launches": 6, "failed": 6}
+
+
+def test_the_rig_can_be_launched_elsewhere(begun, tmp_path, monkeypatch) -> None:
+    content = {
+        "band": "band1",
+        "targets": [{"target_m": 1.9, "draw_m": [-0.35, -0.12]}],
+        "errors": {},
+    }
+    path = tmp_path / policy.REPORT.format("band1")
+    path.parent.mkdir(parents=True)
+    path.write_text(json.dumps(content), "utf-8")
+    monkeypatch.setattr(sys, "argv", ["policy", "band1", "--rig"])
+    policy.main()
+    done = json.loads(path.read_text("utf-8"))
+    assert done["errors"]["on_rig_m"]["launches"] == 2 and done["errors"]["on_rig_m"]["failed"] == 0
+    assert begun == [] and done["targets"][0]["draw_m"] == [-0.35, -0.12]
 
 
 def test_without_a_search_in_physx_a_line_says_what_finds_theta(begun) -> None:

@@ -1,8 +1,8 @@
 """States for which a match holds: what other pauses and earlier draws do to the calibrated band.
 
 Springs have no memory. They are matched to a band that was drawn as far as the recording before,
-in the recording's time, and let go after its pause. The band itself relaxes and softens; by how
-much it then holds and lands otherwise is computed here, with the calibrated simulation.
+in the recording's time, and let go after its pause. The band itself relaxes, flows and softens; by
+how much it then holds and lands otherwise is computed here, with the calibrated simulation.
 """
 
 from __future__ import annotations

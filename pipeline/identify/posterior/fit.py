@@ -20,8 +20,9 @@ from pipeline.identify.posterior.coordinates import Coordinates
 from pipeline.identify.posterior.launches import LaunchLikelihood
 from pipeline.identify.posterior.likelihood import Expansion, Failed, Likelihood
 
-ITERATIONS = 14  # at most
+ITERATIONS = 60  # at most
 BINNED = 4  # of them sort the points into bins anew; then the density keeps its form
+ANEW, FINER = 2, 0.25  # how often a fit that is stuck sorts them anew, by finer differences
 LONGEST = 20.0  # of a step, in those of the finite differences
 STILL = 0.2  # of a last step, in standard deviations: no interval is 2 % wider by as much
 SHORT = 0.25  # of that: a damped step where the fit is stuck
@@ -79,14 +80,12 @@ def fit(
     phi, nuisances = np.array(start, float), np.zeros((len(recordings), 3))
     best: Fit | None = None
     damp, gone, new = DAMP, np.inf, [None] * len(recordings)
+    anew, sort = 0, True
     with ThreadPoolExecutor(workers) as pool:
         for steps in range(1, ITERATIONS + 1):
-            bins = (
-                [expansion.residuals for expansion in best.expansions]
-                if best and steps > BINNED
-                else new
-            )
-            around = coordinates.parameters, phi, _steps(coordinates, phi)
+            sort = sort or steps <= BINNED
+            bins = [x.residuals for x in best.expansions] if best and not sort else new
+            around = coordinates.parameters, phi, FINER**anew * _steps(coordinates, phi)
             try:
                 expansions = [
                     likelihood.expand(*around, nuisance, pool, retained)
@@ -104,7 +103,7 @@ def fit(
             else:
                 seen = launches and launches.expand(*around)
                 trial = _density(coordinates, phi, nuisances, expansions, seen, steps)
-            if trial and (best is None or trial.misfit < best.misfit or steps <= BINNED):
+            if trial and (best is None or trial.misfit < best.misfit or sort):
                 best, damp = trial, damp * EASIER
                 progress(best)
             else:
@@ -112,12 +111,15 @@ def fit(
                     return replace(best, settled=True, steps=steps)
                 damp = max(damp * HARDER, HALF)
             assert best is not None  # else NoFit
+            sort = False
             step = _step(best, coordinates, damp)
             gone = _size(best, step)
             # Damping makes any step short, also where the fit is stuck.
             settled = _size(best, _step(best, coordinates, min(damp, DAMP))) < STILL
             if settled or gone < SHORT * STILL or damp > HARDEST:
-                return replace(best, settled=settled, steps=steps)
+                if settled or anew == ANEW:
+                    return replace(best, settled=settled, steps=steps)
+                anew, sort, damp, step = anew + 1, True, DAMP, 0 * step
             phi = best.phi + step
             nuisances = np.array(
                 [

@@ -122,6 +122,24 @@ def test_it_is_not_settled_where_it_is_stuck():
     np.testing.assert_array_equal(stuck.phi, START)
 
 
+class Coarse(Curve):
+    """Wide differences lead it astray."""
+
+    def expand(self, points, phi, steps, *others) -> SimpleNamespace:
+        result = super().expand(points, phi, steps, *others)
+        if np.any(np.abs(steps) > SIZE / 2):
+            result.gradient = -result.gradient
+        return result
+
+
+def test_a_fit_that_is_stuck_goes_on_by_finer_differences_and_bins_sorted_anew():
+    (plain,), box = curves(1), space()
+    astray = Coarse(plain.seen)
+    result = fit([astray], box, START)
+    assert result.settled and away(result, least([plain], box, START)) < 0.3
+    assert astray.retained.count(None) == BINNED + 1
+
+
 def test_bins_are_kept_after_the_first_iterations(monkeypatch):
     """Or the density would change its form with each step."""
     monkeypatch.setattr(module, "STILL", 0.0)

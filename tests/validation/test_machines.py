@@ -67,7 +67,7 @@ def test_the_same_inputs_give_the_same_theta_with_other_threads(
             result["seconds"] = 0
     assert again == measured
     ours, paper = (measured["bands"][BAND][method] for method in (OURS, PAPER))
-    assert len(paper["theta"]) == 5 and len(ours["theta"]) == 12
+    assert len(paper["theta"]) == 5 and len(ours["theta"]) == 14
     params = load(project / "params.yaml")
     world = load_sling(params, BAND, project), LaunchSetup.of(params.setup, params.sling)
     true = launch(*world, Parameters.of(world[0].law, TRUE), np.array(DRAWS)).landing_y

@@ -40,6 +40,7 @@ def content(model: CalibratedBand, done: Matched, target: str, files: dict[str, 
             for name, value in chain.matched.items()
         ],
         "springs_error": rounded(chain.cubic_springs()[3]),
+        "upturn": rounded(chain.upturn),
         "largest_stretch": rounded(1 + chain.largest_strain, 4),
         "time_step_s": chain.step,
         "time_step_error": rounded(done.finer),

@@ -3,9 +3,9 @@
 Equal masses are joined by massless springs that pull and never push. At a strain e = length / rest
 length - 1 > 0, with l = 1 + e,
 
-    pull = K/3 (l - l^-2) (1 - m + m/l) + K tau e'
+    pull = K/3 (l - l^-2) (1 - m + m/l + c (l^2 + 2/l - 3)) + K tau e'
 
-and the second term alone where e <= 0: a string of Mooney's rubber. The clamps are points.
+and the second term alone where e <= 0: a string of Biderman's rubber. The clamps are points.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class SpringChain:
         floor: Its height, z [m].
         projectile_mass: [kg].
         arm_stiffness: Of the hand's drive [N/m]; None: it does not give way.
-        strength, mooney_share, damping_time: K [N], m, tau [s].
+        strength, mooney_share, upturn, damping_time: K [N], m, c, tau [s].
         largest_strain: Up to which the springs are matched.
         step: Of time [s].
     """
@@ -52,6 +52,7 @@ class SpringChain:
     arm_stiffness: float | None
     strength: float
     mooney_share: float
+    upturn: float
     damping_time: float
     largest_strain: float
     step: float
@@ -64,7 +65,7 @@ class SpringChain:
         """
         setup, band, theta = model.settings.setup, model.band, model.parameters.sample()
         tension, stretch = cls.tension(model, draws, hold_force)
-        share = theta.get("mooney_share", 0.0)
+        share, upturn = theta.get("mooney_share", 0.0), theta.get("upturn", 0.0)
         chain = cls(
             edges=EDGES,
             rest_length=band.rest_length,
@@ -73,8 +74,9 @@ class SpringChain:
             floor=-setup.fork_height,
             projectile_mass=setup.projectile_mass,
             arm_stiffness=setup.arm_stiffness,
-            strength=float(np.mean(3 * tension / uniaxial(stretch, share))),
+            strength=float(np.mean(3 * tension / uniaxial(stretch, share, upturn))),
             mooney_share=share,
+            upturn=upturn,
             damping_time=theta["elasticity_damping"],
             largest_strain=float(stretch.max() - 1),
             step=STEPS[-1],
@@ -118,7 +120,8 @@ class SpringChain:
 
     def pull(self, strain: np.ndarray | float) -> np.ndarray:
         """Pull of a spring at rest [N], like `strain`."""
-        return self.strength / 3 * uniaxial(1 + np.maximum(strain, 0.0), self.mooney_share)
+        stretch = 1 + np.maximum(strain, 0.0)
+        return self.strength / 3 * uniaxial(stretch, self.mooney_share, self.upturn)
 
     @property
     def stable_step(self) -> float:
@@ -137,7 +140,9 @@ class SpringChain:
     @property
     def _fastest(self) -> float:
         """Square of the fastest mode's rate [1/s^2]: neighbours that go against each other."""
-        return 4 * self.strength / self.spring_length / self.node_mass
+        strain = np.linspace(0, self.largest_strain, 101)
+        steepest = max(self.strength, float(np.gradient(self.pull(strain), strain).max()))
+        return 4 * steepest / self.spring_length / self.node_mass
 
     def cubic_springs(self) -> tuple[np.ndarray, np.ndarray, float, float]:
         """The pull as that of two springs of cubic pull, the second beyond a knee.

@@ -42,6 +42,7 @@ class Numbers:
     projectile_mass: float
     strength: float
     share: float
+    upturn: float
     damping: float
     stiffness: float
     hand_damping: float
@@ -60,7 +61,8 @@ def spring(node: wp.vec3, other: wp.vec3, v_one: wp.vec3, v_other: wp.vec3, n: N
     rate = wp.dot(v_other - v_one, direction) / n.rest
     pull = n.strength * n.damping * rate
     if stretch > 1.0:
-        shape = 1.0 - n.share + n.share / stretch
+        first = stretch * stretch + 2.0 / stretch - 3.0
+        shape = 1.0 - n.share + n.share / stretch + n.upturn * first
         pull += n.strength / 3.0 * (stretch - 1.0 / (stretch * stretch)) * shape
     return pull * direction
 
@@ -151,7 +153,8 @@ class SpringBands:
         n.rest = numbers_known["rest_length_m"] / n.edges
         n.node_mass = numbers_known["mass_kg"] / n.edges
         n.projectile_mass = numbers_known["projectile_mass_kg"]
-        n.strength, n.share = numbers_known["strength_n"], numbers_known["mooney_share"]
+        n.strength = numbers_known["strength_n"]
+        n.share, n.upturn = numbers_known["mooney_share"], numbers_known["upturn"]
         n.damping = numbers_known["damping_time_s"]
         self.arm_stiffness = numbers_known["arm_stiffness_n_per_m"] or STIFF
         n.hand_mass, n.gravity = HAND_MASS, GRAVITY

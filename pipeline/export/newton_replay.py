@@ -26,6 +26,7 @@ def numbers(name: str, chain: SpringChain, draws: np.ndarray) -> dict:
         "arm_stiffness_n_per_m": chain.arm_stiffness,
         "strength_n": chain.strength,
         "mooney_share": chain.mooney_share,
+        "upturn": chain.upturn,
         "damping_time_s": chain.damping_time,
         "largest_strain": chain.largest_strain,
         "time_step_s": chain.step,

@@ -15,7 +15,7 @@ def chain() -> SpringChain:
     return SpringChain(
         edges=20, rest_length=0.52, mass=0.023, half_width=0.1375, floor=-0.52,
         projectile_mass=0.039, arm_stiffness=None, strength=17.0, mooney_share=0.4,
-        damping_time=1.5e-3, largest_strain=1.1, step=1e-4,
+        upturn=0.0, damping_time=1.5e-3, largest_strain=1.1, step=1e-4,
     )  # fmt: skip
 
 
@@ -28,9 +28,11 @@ def pulled_by_two(chain: SpringChain, strain: np.ndarray) -> np.ndarray:
     return whole[:, None] ** powers @ first + beyond[:, None] ** powers @ second
 
 
-@pytest.mark.parametrize("share", [-0.3, 0.0, 0.4, 0.9])
-def test_two_cubic_springs_pull_as_the_law(chain, share) -> None:
-    chain = replace(chain, mooney_share=share)
+@pytest.mark.parametrize(
+    ("share", "upturn"), [(-0.3, 0.0), (-0.3, 0.25), (0.0, 0.1), (0.4, 0.0), (0.9, 0.05)]
+)
+def test_two_cubic_springs_pull_as_the_law(chain, share, upturn) -> None:
+    chain = replace(chain, mooney_share=share, upturn=upturn)
     strain = np.linspace(0.1, chain.largest_strain, 50)
     error = pulled_by_two(chain, strain) / chain.pull(strain) - 1
     summary = chain.cubic_springs()[3]
@@ -39,13 +41,13 @@ def test_two_cubic_springs_pull_as_the_law(chain, share) -> None:
 
 
 def test_the_first_guess_is_the_law_of_a_stretched_string() -> None:
-    """Without relaxation: E A, and Mooney's share."""
-    theta = Theta(2.2e5, 0.47, 2e-3, 0.7, 0.6, mooney_share=0.3, relaxation=0.0)
+    """Without relaxation: E A, Mooney's share and the upturn."""
+    theta = Theta(2.2e5, 0.47, 2e-3, 0.7, 0.6, mooney_share=0.3, upturn=0.1, relaxation=0.0)
     model = Model(Band(mass=0.023, diameter=0.010, rest_length=0.52), theta)
     draws = np.array([[-0.30, 0.0], [-0.35, 0.0], [-0.40, 0.0]])
     chain = SpringChain.of(model, draws, model.launches(draws).hold_force)
     assert chain.strength == pytest.approx(2.2e5 * np.pi * 0.005**2, rel=0.02)
-    assert (chain.mooney_share, chain.floor) == (0.3, -0.52)
+    assert (chain.mooney_share, chain.upturn, chain.floor) == (0.3, 0.1, -0.52)
     assert 1 + chain.largest_strain == pytest.approx(2 * np.hypot(0.1375, 0.40) / 0.52)
 
 

@@ -53,9 +53,9 @@ def remove_band(name: str, agreed: Callable[[list[str]], bool], root: Path | str
     lines = [f"bands.{name} of {path}, and where run: names it", *map(str, files)]
     if not agreed(lines):
         raise UserError(f"{name}: is kept; with --yes nobody is asked")
+    drop(root, lambda stage: stage.partition("@")[2].partition("-")[0] == name)  # may refuse
     for file in files:
         shutil.rmtree(file) if file.is_dir() else file.unlink()
-    drop(root, lambda stage: stage.partition("@")[2].partition("-")[0] == name)
     write_text(path, text)
     return "\n".join([f"{name} removed:", *(f"  {line}" for line in lines)])
 

@@ -89,6 +89,8 @@ def _take_gpu(free) -> None:
     seen = os.environ.get("CUDA_VISIBLE_DEVICES")
     number = free.get()
     os.environ["CUDA_VISIBLE_DEVICES"] = seen.split(",")[number] if seen else str(number)
+    if os.environ.get("SLING_DEVICE", "cpu") != "cpu":
+        os.environ["SLING_DEVICE"] = "cuda"  # its name among those that this process sees
 
 
 def exported(target: str, band: str) -> dict:

@@ -83,6 +83,18 @@ def test_dvcs_entries_of_its_stages_go_too(project: Path, monkeypatch) -> None:
     assert not lock.exists()  # DVC reads none without stages
 
 
+def test_where_dvc_refuses_nothing_is_removed(project: Path, monkeypatch) -> None:
+    def refuse(*of) -> None:
+        raise UserError("DVC is busy")
+
+    put(project, "orange")
+    before = content(project)
+    monkeypatch.setattr(module, "drop", refuse)
+    with pytest.raises(UserError, match="DVC is busy"):
+        remove_band("orange", lambda lines: True, project)
+    assert content(project) == before
+
+
 @pytest.mark.parametrize(
     ("name", "answer", "message"),
     [

@@ -20,7 +20,7 @@ from tests.simulator.bands import neo, random_draws, random_thetas
 pytestmark = pytest.mark.skipif(not gpus(), reason="no CUDA device on this machine")
 
 
-RUBBER = {"mooney_share": 0.3, "relaxation": 0.02}
+RUBBER = {"mooney_share": 0.3, "relaxation": 0.02, "flow": 0.2, "log_flow_rate": 3.0}
 LAWS = {"neo_hookean": {}, "rubber": RUBBER}
 
 

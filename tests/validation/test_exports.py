@@ -61,8 +61,10 @@ def test_a_process_sees_its_gpu_alone(monkeypatch) -> None:
     for number in (1, 0):
         free.put(number)
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "4,7")
+    monkeypatch.setenv("SLING_DEVICE", "cuda:1")
     exports._take_gpu(free)
     assert exports.os.environ["CUDA_VISIBLE_DEVICES"] == "7"
+    assert exports.os.environ["SLING_DEVICE"] == "cuda"  # CUDA sees one alone
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES")
     exports._take_gpu(free)
     assert exports.os.environ.pop("CUDA_VISIBLE_DEVICES") == "0"

@@ -114,6 +114,8 @@ class Theta:
     def __post_init__(self) -> None:
         for attribute in fields(self):
             object.__setattr__(self, attribute.name, _plain(getattr(self, attribute.name)))
+        if self.flow and self.log_flow_rate is None:
+            raise UserError("theta.log_flow_rate: must be given beside flow")
         if self.law == RUBBER:  # what is not given of it is none
             for name in ADDED:
                 if getattr(self, name) is None:

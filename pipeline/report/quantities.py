@@ -34,7 +34,7 @@ QUANTITIES = {  # in the order of the cards
     "softening": Quantity("softening by the first stretch", "softening", "%", 100.0),
     "relaxation": Quantity("stress relaxation per decade of time", "relaxation", "%", 100.0),
     "flow": Quantity("flowing share", "flow", "%", 100.0),
-    "log_flow_rate": Quantity("log10 flow rate", "log10 flow rate", "1/s"),
+    "log_flow_rate": Quantity("log10 flow rate", "log10 flow rate"),
     "elasticity_damping": Quantity("damping time", "d", "ms", 1e3),
     "damping_scale": Quantity("damping scale", "s"),
     "poissons_ratio": Quantity("Poisson's ratio", "ν"),

@@ -71,6 +71,7 @@ def test_theta_is_read_as_it_is_written(tmp_path, rubber) -> None:
         ({"youngs_modulus": -1.0}, "theta.youngs_modulus: must be between"),
         ({"youngs_modulus": "2e5"}, "theta.youngs_modulus: must be a number"),
         ({"mooney_share": 2.0}, "theta.mooney_share: must be between"),
+        ({"flow": 0.3}, "theta.log_flow_rate: must be given beside flow"),
         ({"returned_share": 0.0}, "returned_share: must be between"),
     ],
 )

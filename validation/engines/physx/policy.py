@@ -92,8 +92,9 @@ class PhysxLauncher:
         return launch(self.sling, self.setup, parameters, draws, workers=cores())
 
     def _batch(self, draws: np.ndarray) -> Launched:
-        where = [self.theta, draws, [RATE, ITERATIONS, self.sling.mass, self.sling.radius]]
-        name = hashlib.sha256(b"".join(np.asarray(part, float).tobytes() for part in where))
+        settings = repr((RATE, ITERATIONS, self.sling.mass, self.sling.radius, self.setup))
+        where = [np.asarray(part, float).tobytes() for part in (self.theta, draws)]
+        name = hashlib.sha256(b"".join([*where, settings.encode()]))
         path = CHECKPOINTS / f"{name.hexdigest()[:16]}.json"
         if not path.exists():
             began = time.monotonic()

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from pipeline.launching.surface.stored import Stored
 from pipeline.params import Params
@@ -13,6 +14,7 @@ from pipeline.report.drawing.canvas import P, Saving
 from pipeline.report.drawing.styles import Styles, drawn, styles
 from pipeline.report.run.landscape import Landscape, landscape
 from pipeline.report.run.paper import METHOD
+from pipeline.report.run.physx import launched
 from pipeline.report.run.repeated import Repeated
 from pipeline.report.run.replay import MethodReplay, replay_method
 from pipeline.report.run.results import Result, Results, gather
@@ -27,6 +29,7 @@ class Report:
         styles: By method.
         landscape: Of the first search that refines regions, with its result, where one did.
         repeated: The campaign on more recordings of the rig, where its bands ran.
+        in_physx: Launches by the paper's method in the paper's engine, by band of the rig.
         root: Of the project, with data/ and reports/.
     """
 
@@ -36,6 +39,7 @@ class Report:
     styles: Styles
     landscape: tuple[Result, Landscape] | None
     repeated: Repeated | None
+    in_physx: dict[str, pd.DataFrame]
     root: Path
 
     @classmethod
@@ -50,7 +54,8 @@ class Report:
             searched,
             landscape(params, searched, results.episodes[searched.band]),
         )
-        return cls(params, results, replays, named, chart, repeated, root)
+        in_physx = launched(root, results.floors)
+        return cls(params, results, replays, named, chart, repeated, in_physx, root)
 
     @property
     def folder(self) -> Path:

@@ -33,7 +33,7 @@ def paper_tables(report: Report) -> str:
     identified = parameters.identified(results, params)
     tables = {2: (parameters.as_table(identified, named), parameters.records(identified))}
     for count, rows in (
-        (1, benchmark.benchmark(results)),
+        (1, benchmark.benchmark(results, report.in_physx)),
         (3, benchmark.ablation(results, paper.OPTIMISERS)),
         (4, benchmark.ablation(results, paper.ABLATIONS)),
     ):
@@ -54,6 +54,7 @@ def paper_tables(report: Report) -> str:
         sources={row[2] for table, _ in tables.values() for row in table[1]},
         area=TARGET_AREA,
         floors=results.floors,
+        in_physx=report.in_physx,
         campaign={n: markdown(campaign.as_table(repeated, n)) for n in campaign.ROWS if repeated},
         level=LEVEL,
         changed=repeated and _listed(repeated.changed_settings(params)),

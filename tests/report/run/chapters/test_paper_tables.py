@@ -20,12 +20,10 @@ NAMED = styles(["least_squares", "package_si", "de", "no_work"])
 
 @pytest.fixture
 def written(tmp_path):
-    def run(*some, floors=None) -> str:
-        ran = results(*some, floors=floors)
+    def run(*some, floors=None, in_physx=None) -> str:
+        ran, beside = results(*some, floors=floors), {"repeated": None, "in_physx": in_physx or {}}
         return paper_tables(
-            SimpleNamespace(
-                params=PARAMS, results=ran, styles=NAMED, folder=tmp_path, repeated=None
-            )
+            SimpleNamespace(params=PARAMS, results=ran, styles=NAMED, folder=tmp_path, **beside)
         )
 
     return run
@@ -47,10 +45,13 @@ def test_every_table_is_there_in_each_form(written, tmp_path) -> None:
     files = {file.relative_to(tmp_path).as_posix() for file in (tmp_path / "tables").iterdir()}
     assert set(links) == files and len(links) == 8
     assert all(len(pd.read_csv(tmp_path / name)) for name in files if name.endswith("csv"))
-    assert "*Actuation floor*" in text
+    assert "*Actuation floor*" in text and "PhysX" not in text
     first = {name: (tmp_path / name).read_bytes() for name in files}
     assert written(*ran, floors=floors) == text
     assert {name: (tmp_path / name).read_bytes() for name in files} == first
+    text = written(*ran, floors=floors, in_physx={"band1": launches(0.3 + NOISE)})
+    assert "Sling2Sim2Real in PhysX" in text
+    assert "[band1](validation/physx-policy-band1.json)" in text
 
 
 def test_nothing_is_said_of_what_did_not_run(written, tmp_path) -> None:

@@ -37,6 +37,7 @@ from pipeline.simulator.launch import Launches, launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import THETA, Parameters
 from validation import orange
+from validation.campaigns.runner import read
 from validation.engines.physx import study
 from validation.engines.physx.bands import Engine, release
 from validation.engines.physx.exported import yielded
@@ -213,7 +214,7 @@ def main() -> None:
         raise UserError(f"no band {band} in {requested.params}")
     path = Path(REPORT.format(band))
     if requested.rig:
-        content = json.loads(path.read_text("utf-8"))
+        content = read(path)
         launched_on_rig(content, params)
         write_json(path, plain(content))
         return

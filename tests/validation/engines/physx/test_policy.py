@@ -94,6 +94,12 @@ def test_the_rig_can_be_launched_elsewhere(begun, tmp_path, monkeypatch) -> None
     assert begun == [] and done["targets"][0]["draw_m"] == [-0.35, -0.12]
 
 
+def test_the_rig_alone_wants_a_report(begun, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["policy", "band1", "--rig"])
+    with pytest.raises(UserError, match="physx-policy-band1.json: missing"):
+        policy.main()
+
+
 def test_without_a_search_in_physx_a_line_says_what_finds_theta(begun) -> None:
     with pytest.raises(UserError, match="physx.search band1 finds one"):
         policy.main()

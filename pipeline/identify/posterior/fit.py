@@ -17,8 +17,9 @@ from scipy.optimize import lsq_linear
 
 from pipeline.base.errors import UserError
 from pipeline.identify.posterior.coordinates import Coordinates
+from pipeline.identify.posterior.expansion import Expansion
 from pipeline.identify.posterior.launches import LaunchLikelihood
-from pipeline.identify.posterior.likelihood import Expansion, Failed, Likelihood
+from pipeline.identify.posterior.likelihood import Failed, Likelihood
 
 ITERATIONS = 60  # at most
 BINNED = 4  # of them sort the points into bins anew; then the density keeps its form

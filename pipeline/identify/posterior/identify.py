@@ -1,7 +1,7 @@
 """A band's parameters from its recordings and launches, as the density stage writes them.
 
-One density: its mode is θ*, its samples the intervals. With several recordings the Gaussian is as
-wide as they differ (Birge's ratio, Phys. Rev. 40, 1932): their disagreement beyond what each leaves
+One density: its mode is θ*, its samples the intervals. With several recordings it is as wide as
+they differ (Birge's ratio, Phys. Rev. 40, 1932): their disagreement beyond what each leaves
 open is the model's discrepancy, and no other is assumed but the returned share's prior.
 """
 
@@ -13,15 +13,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
 from pipeline.episode.pull import deepest_draw, launch_history
 from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.posterior.coordinates import Coordinates
-from pipeline.identify.posterior.draws import truncated_gaussian
 from pipeline.identify.posterior.fit import Fit, fit
 from pipeline.identify.posterior.launches import Evidence, LaunchLikelihood, without_each
 from pipeline.identify.posterior.likelihood import SIMULATED, Failed, Likelihood
 from pipeline.identify.posterior.residuals import BINS, LEAST_POINTS
+from pipeline.identify.posterior.sampling import SAMPLES, Remaining, samples_of
 from pipeline.identify.results.theta import content_of
 from pipeline.identify.results.units import SI_UNITS
 from pipeline.params import Params
@@ -31,7 +32,6 @@ from pipeline.simulator.parameters import EXTRA, Parameters
 from pipeline.simulator.rubber import RUBBER
 
 LEVEL = 0.9
-SAMPLES = 200
 WIDER = 1.2  # times the usual spread: less changes no interval by much
 FILLS = 2 / 3  # of the prior's interval: one as wide tells nothing
 
@@ -44,6 +44,8 @@ class Identified:
         coordinates, fit: The density, and its mode.
         birge: By what the recordings' disagreement widens each standard deviation; 1 for one.
         samples: Of the coordinates, within bounds, shape (SAMPLES, D).
+        effective, batches: How many samples of even weight these are worth, and how many batches
+            of SAMPLES rollouts they took of each recording.
         recordings, launches: The evidence.
     """
 
@@ -51,6 +53,8 @@ class Identified:
     fit: Fit
     birge: float
     samples: np.ndarray
+    effective: float
+    batches: int
     recordings: list[Likelihood]
     launches: LaunchLikelihood | None
 
@@ -66,9 +70,9 @@ class Identified:
 
     @property
     def rollouts(self) -> int:
-        """Simulated interactions of the fit."""
+        """Simulated interactions of the fit, and of the samples."""
         each = len(self.coordinates.names) + len(SIMULATED)  # with the mode, without the clock
-        return self.fit.steps * len(self.recordings) * each
+        return len(self.recordings) * (self.fit.steps * each + self.batches * SAMPLES)
 
 
 def fit_posterior(
@@ -132,26 +136,9 @@ def fit_posterior(
                 file=sys.stderr,
             )
     birge = birge_ratio(fitted)
-    rng = np.random.default_rng(params.optimizer.seed)
-    samples = samples_around(fitted, coordinates, birge, rng)
-    return Identified(coordinates, fitted, birge, samples, recordings, launches)
-
-
-def samples_around(
-    fitted: Fit, coordinates: Coordinates, widened: float, rng: np.random.Generator
-) -> np.ndarray:
-    """SAMPLES of the Gaussian around a mode, within bounds, shape (SAMPLES, D).
-
-    A gradient counts where it leads out of the bounds. Elsewhere it is what a settled fit left of
-    a step that led no further, and would move the samples away from the mode.
-
-    Args:
-        widened: By what the density's standard deviations are multiplied.
-    """
-    box = coordinates.low, coordinates.high
-    outward = np.where(fitted.gradient < 0, fitted.phi <= box[0], fitted.phi >= box[1])
-    centre = fitted.phi + np.linalg.solve(fitted.hessian, fitted.gradient * outward)
-    return truncated_gaussian(centre, fitted.hessian / widened**2, *box, SAMPLES, rng)
+    evidence_left = Remaining(fitted, coordinates, recordings, launches, workers or cores())
+    samples, effective, batches = samples_of(evidence_left, birge, params.optimizer.seed)
+    return Identified(coordinates, fitted, birge, samples, effective, batches, recordings, launches)
 
 
 def recorded_history(sling: ClampedBand, episodes: Sequence[Episode]) -> LaunchHistory | None:
@@ -228,6 +215,7 @@ def confidence(identified: Identified) -> dict:
         "launches": _launched(identified),
         "steps": identified.fit.steps,
         "settled": identified.fit.settled,
+        "effective_samples": identified.effective,
     }
 
 

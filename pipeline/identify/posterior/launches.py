@@ -64,8 +64,9 @@ class LaunchLikelihood:
         after: The same after all of them.
         left: Of each, log of measured over simulated landing at the last expansion; NaN where the
             simulated launch fails, which then counts for nothing.
-        gap, design: Of each, `left` and its change with the D coordinates, shape (D, N), both in
-            standard deviations of the launch.
+        spread: Standard deviation of each, of that logarithm.
+        gap, design: Of each, `left` and its change with the D coordinates, shape (D, N), both over
+            the spread.
     """
 
     def __init__(
@@ -79,7 +80,8 @@ class LaunchLikelihood:
         seen = np.maximum.accumulate(np.append(first, np.linalg.norm(self.draws, axis=1)))
         self.deepest, self.after = seen[:-1], float(seen[-1])
         self.left = np.full(len(self.draws), np.nan)
-        self.gap, self.design = self.left, np.zeros((0, len(self.draws)))
+        self.spread = self.gap = self.left
+        self.design = np.zeros((0, len(self.draws)))
 
     def expand(
         self, parameters_of: Callable[[np.ndarray], Parameters], phi: np.ndarray, steps: np.ndarray
@@ -102,11 +104,23 @@ class LaunchLikelihood:
         ).reshape(count, -1)
         self.left = np.log(self.landings / here)
         changes = (np.log(moved) - np.log(here)) / steps[:, None]  # (D, N)
-        spread = np.hypot(slope * self.errors / here, TAPE / self.landings)
-        self.gap, self.design = self.left / spread, changes / spread
+        self.spread = np.hypot(slope * self.errors / here, TAPE / self.landings)
+        self.gap, self.design = self.left / self.spread, changes / self.spread
         good = np.isfinite(self.gap + self.design.sum(axis=0))
         gap, design = self.gap[good], self.design[:, good]
         return float(gap @ gap), design @ design.T, design @ gap
+
+    def remaining(self, parameters: Parameters) -> np.ndarray:
+        """Logs of measured over simulated landings of M parameters, over the spread: (M, N).
+
+        NaN where a simulation fails; of the launches that do not fail at the last expansion.
+        """
+        good = np.flatnonzero(np.isfinite(self.gap + self.design.sum(axis=0)))
+        count = len(parameters)
+        number = np.tile(good, count)
+        each = parameters[np.repeat(np.arange(count), len(good))]
+        landed = self._simulated(each, self.draws[number], number).reshape(count, -1)
+        return np.log(self.landings[good] / landed) / self.spread[good]
 
     def _simulated(
         self, parameters: Parameters, draws: np.ndarray, number: np.ndarray

@@ -22,13 +22,13 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.alignment import recoil_seen
 from pipeline.identify.posterior.coordinates import LOSS
+from pipeline.identify.posterior.expansion import Elimination, Expansion
 from pipeline.identify.posterior.residuals import Residuals, Rule
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
 
 SIMULATED = "release", "camera", "hand"
-UNLIKE = 0.05  # an autocorrelation that is none
 RELEASE_ERROR = 3e-5  # s: of the release, where the clocks are known by it
 NUDGE = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
 
@@ -83,80 +83,6 @@ class Tolerances:
     @property
     def simulated(self) -> np.ndarray:
         return np.array([self.release, self.camera, self.hand])
-
-
-@dataclass(frozen=True)
-class Expansion:
-    """-2 log p of a recording around (phi, n), its nuisances eliminated.
-
-    Attributes:
-        misfit: There, with the linear nuisances at their best.
-        hessian, gradient: misfit + const - 2 gradient d + d' hessian d for d in phi, (D, D), (D,).
-        nuisances: Best change of the simulated ones, and its change with d, (3,), (3, D).
-        spread: Standard deviations of the simulated ones, given phi, (3,).
-        residuals, left: What was compared, and what of it is left at d = 0, shape (R,).
-    """
-
-    misfit: float
-    hessian: np.ndarray
-    gradient: np.ndarray
-    nuisances: tuple[np.ndarray, np.ndarray]
-    spread: np.ndarray
-    residuals: Residuals
-    left: np.ndarray
-
-    def rms(self, part: str) -> float:
-        """Root mean square of what is left of force [N], held or recoil [m]; 0 of nothing."""
-        count = len(self.left) - 2 * len(self.residuals.picture)
-        bins, recoils = self.left[count:].reshape(2, -1), self.residuals.recoils
-        parts = {"force": self.left[:count], "held": bins[:, ~recoils], "recoil": bins[:, recoils]}
-        return float(np.sqrt(np.mean(parts[part] ** 2))) if parts[part].size else 0.0
-
-    @property
-    def discrepancy(self) -> float:
-        """Standard deviation of a sample of the force [N], were samples independent.
-
-        Of what is left of it along the axis where that is most: the root mean square times the root
-        of the number of samples in which it repeats itself (integrated autocorrelation time). What
-        a law gets wrong of a pull lasts for seconds.
-        """
-        count = len(self.residuals.samples)
-        return max(_repeated(axis) for axis in self.left[: 3 * count].reshape(3, count))
-
-    @property
-    def recoil_discrepancy(self) -> float:
-        """The same of the recoil, as a share of the way gone; that of the picture where it is most.
-
-        What a law gets wrong of a recoil moves all of a picture's points together.
-        """
-        seen, count = self.residuals, len(self.left) - 2 * len(self.residuals.picture)
-        bins, gone = self.left[count:].reshape(2, -1), seen.gone()
-        pictures = [seen.picture == picture for picture in np.unique(seen.picture[seen.recoils])]
-        return max(
-            (
-                _repeated(bins[axis, picture]) / gone[picture][0]
-                for picture in pictures
-                for axis in (0, 1)
-            ),
-            default=0.0,
-        )
-
-    @property
-    def pictures(self) -> list[float]:
-        """Times of the pictures in which the recoil is seen, from the release [s]."""
-        seen, episode = self.residuals.picture[self.residuals.recoils], self.residuals.episode
-        return (episode.cloud_time[np.unique(seen)] - episode.release_time).tolist()
-
-
-def _repeated(left: np.ndarray) -> float:
-    """Root mean square of samples (S,), times the root of their autocorrelation time in samples."""
-    size = left @ left
-    if not size:
-        return 0.0
-    alike = np.correlate(left, left, "full")[len(left) :] / size
-    ends = np.flatnonzero(alike < UNLIKE)
-    time = 1 + 2 * alike[: ends[0] if len(ends) else len(alike)].sum()
-    return float(np.sqrt(size / len(left) * time))
 
 
 def opening_time(episode: Episode, sling: ClampedBand, friction: float) -> float:
@@ -298,9 +224,40 @@ class Likelihood:
         slopes = (vectors[1:] - gap) / steps[:, None]
         # The force tells nothing of the loss factor, the recoil does: a law that lacks slow
         # hysteresis would take the one for the other.
-        slopes[LOSS, : 3 * len(residuals.samples)] = 0.0
+        uncounted = slopes[LOSS].copy()
+        uncounted[3 * len(residuals.samples) :] = 0.0
+        slopes[LOSS] -= uncounted
         nuisance_slopes = (moved - gap) / NUDGE[:, None]
-        return self._eliminated(residuals, gap, slopes, nuisance_slopes, nuisances)
+        expansion = self._eliminated(residuals, gap, slopes, nuisance_slopes, nuisances)
+        return replace(expansion, uncounted=uncounted)
+
+    def remaining(
+        self,
+        parameters: Parameters,
+        expansion: Expansion,
+        nuisances: np.ndarray,
+        loss: np.ndarray,
+        workers: int,
+    ) -> np.ndarray:
+        """What nuisances leave of the residuals of N parameters, NaN where a simulation fails.
+
+        Its squares add up to -2 log p, in the bins of an expansion and with the nuisances' effects
+        there.
+
+        Args:
+            nuisances: Where the expansion was made, shape (3,).
+            loss: Changes of the logarithm of the loss factor since, shape (N,).
+
+        Returns:
+            Shape (N, R + K).
+        """
+        seen = self.shifted(nuisances)
+        until = max(seen.cloud_time, default=np.inf)
+        done = interact(self.sling, seen, parameters, until=until, workers=workers)
+        residuals = expansion.residuals(done) - np.outer(loss, expansion.uncounted)
+        left = expansion.elimination(residuals)
+        left[[why is not None for why in done.failure]] = np.nan
+        return left
 
     def _eliminated(
         self,
@@ -330,15 +287,16 @@ class Likelihood:
         design = np.concatenate([slopes, nuisance_slopes, linear]) * weight  # (D + 3 + M, R)
         left = -gap * weight
         gram, right = design @ design.T, design @ left
-        n = slice(of_phi, of_phi + simulated)
-        gram[n, n] += np.diag(tolerances.simulated**-2)
-        right[n] -= nuisances / tolerances.simulated**2
-        m = np.arange(of_phi + simulated, len(gram))  # linear, in units of their tolerances
-        gram[m, m] += 1.0
-        cost = left @ left + np.sum((nuisances / tolerances.simulated) ** 2)
-        best_linear = np.linalg.solve(gram[np.ix_(m, m)], right[m])
         every_nuisance = slice(of_phi, None)
+        sizes = np.append(tolerances.simulated, np.ones(len(linear)))  # of the nuisances' priors
+        own = np.append(nuisances / tolerances.simulated, np.zeros(len(linear)))
+        gram[every_nuisance, every_nuisance] += np.diag(sizes**-2)
+        right[every_nuisance] -= own / sizes
+        m = slice(of_phi + simulated, None)  # linear
+        cost = left @ left + own @ own
+        best_linear = np.linalg.solve(gram[m, m], right[m])
         inverse = np.linalg.inv(gram[every_nuisance, every_nuisance])  # C^-1
+        effects = np.vstack([design[every_nuisance].T, np.diag(1 / sizes)])
         coupling = gram[:of_phi, every_nuisance]  # B
         best, change = inverse @ right[every_nuisance], -inverse @ gram[every_nuisance, :of_phi]
         return Expansion(
@@ -349,6 +307,8 @@ class Likelihood:
             spread=np.sqrt(np.diag(inverse)[:simulated]),
             residuals=residuals,
             left=(left - best_linear @ design[m]) / weight,
+            elimination=Elimination(weight, own, np.linalg.qr(effects)[0]),
+            uncounted=np.zeros(len(left)),
         )
 
     def _linear(self, residuals: Residuals, gap: np.ndarray, camera: np.ndarray) -> np.ndarray:

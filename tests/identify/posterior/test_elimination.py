@@ -5,12 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.identify.posterior.likelihood import (
-    Likelihood,
-    Tolerances,
-    _repeated,
-    opening_time,
-)
+from pipeline.identify.posterior.expansion import _repeated
+from pipeline.identify.posterior.likelihood import Likelihood, Tolerances, opening_time
 
 PHI, INNER, FORCES, BINS = 4, 3, 15, 12
 PICTURE = np.repeat([7, 8, 9], 4)
@@ -122,6 +118,18 @@ def test_the_misfit_has_the_linear_ones_at_their_best_and_the_simulated_as_they_
     has, size = case.tolerances, len(case.gap)
     sigma = case.spread(has.force, has.cloud, has.way)
     np.testing.assert_allclose(expansion.left, left[:size] * sigma, rtol=1e-6, atol=1e-12)
+
+
+def test_elimination_leaves_of_any_residuals_what_least_squares_does(case):
+    """With the simulated nuisances free too, for residuals that no expansion has seen."""
+    expansion, (rows, aim) = case.expanded(), case.full()
+    some = case.gap + np.random.default_rng(2).normal(0, 0.1, (3, len(case.gap)))
+    has = case.tolerances
+    sigma = case.spread(has.force, has.cloud, has.way)
+    for residuals, left in zip(some, expansion.elimination(some), strict=True):
+        goal = np.append(-residuals / sigma, aim[len(sigma) :])
+        best = np.linalg.lstsq(rows[:, PHI:], goal, rcond=None)[0]
+        assert left @ left == pytest.approx(np.sum((goal - rows[:, PHI:] @ best) ** 2), rel=1e-9)
 
 
 NAMED = "force cloud way release camera hand jitter shift turn bias drift pose".split()

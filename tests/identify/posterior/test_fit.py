@@ -8,7 +8,8 @@ import pytest
 
 from pipeline.identify.posterior import fit as module
 from pipeline.identify.posterior.fit import BINNED, NoFit, fit
-from pipeline.identify.posterior.identify import birge_ratio, leave_one_out, samples_around
+from pipeline.identify.posterior.identify import birge_ratio, leave_one_out
+from pipeline.identify.posterior.sampling import samples_around
 from tests.identify.posterior.toy import SIZE, Curve, curve, least, space
 
 TRUE = np.array([8.0, 9.0, 3.0]) * SIZE

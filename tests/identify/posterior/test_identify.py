@@ -14,6 +14,7 @@ from pipeline.identify.posterior.fit import STILL
 from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
 from pipeline.identify.posterior.likelihood import Likelihood
 from pipeline.identify.posterior.residuals import Residuals, Rule
+from pipeline.identify.posterior.sampling import Remaining
 from pipeline.identify.results.theta import load_theta
 from pipeline.params.identification import parameter_names
 from pipeline.simulator.interaction import interact
@@ -141,6 +142,21 @@ def test_the_theta_file_is_of_the_band_after_all_that_stretched_it(first):
         launches = LaunchLikelihood([Observed(draw, 0.001, 3.0)], SLING, setup)
         written = identify.theta_entries(replace(first, launches=launches))
         assert written["history"] == vars(replace(history, deepest=float(deepest)))
+
+
+def test_what_remains_at_the_mode_is_its_misfit(both):
+    """But for the last step of the simulated nuisances, which are free here."""
+    parts = both.fit, SPACE, both.recordings, None, WORKERS
+    phi = np.repeat(both.fit.phi[None], 2, axis=0)
+    phi[1, coordinates.LOSS] += 0.3
+    left = Remaining(*parts)(phi)
+    misfit = sum(expansion.misfit for expansion in both.fit.expansions)
+    assert np.sum(left[0] ** 2) == pytest.approx(misfit, abs=0.5)
+    assert np.sum(left[1] ** 2) > misfit + 0.5  # the recoil's pictures show it
+
+
+def test_samples_are_worth_many_and_said(first):
+    assert identify.SAMPLES / 4 < told_of(first)["effective_samples"] <= identify.SAMPLES + 1e-6
 
 
 def test_workers_change_no_byte(exact, first):

@@ -51,6 +51,17 @@ def test_the_update_is_the_linear_gaussian_one() -> None:
     np.testing.assert_allclose(moved, gain * np.log(landing / here), rtol=1e-3)
 
 
+def test_what_is_left_of_launches_at_other_coordinates() -> None:
+    """At the expansion its gap; elsewhere the log is linear. One that fails there is left out."""
+    failing = Observed((-0.5, 0.2), 0.001, 0.3)
+    evidence, *_ = expanded(
+        Observed((-0.5, -0.2), 0.001, 0.31), failing, Observed((-0.6, -0.1), 0.002, 0.4)
+    )
+    left = evidence.remaining(np.array([[0.0, 0.0], [0.1, -0.3]]))
+    np.testing.assert_allclose(left[0], evidence.gap[[0, 2]])
+    np.testing.assert_allclose(left[1], left[0] + 0.05 / evidence.spread[[0, 2]])
+
+
 def test_two_launches_tell_more_than_one_and_their_order_nothing() -> None:
     near, far = Observed((-0.5, -0.2), 0.001, 0.31), Observed((-0.6, -0.1), 0.0, 0.4)
     first, second = expanded(near), expanded(far)

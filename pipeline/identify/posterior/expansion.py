@@ -17,18 +17,18 @@ class Elimination:
 
     Attributes:
         weight: One over the spread of each residual, shape (R,).
-        own: What the nuisances are off their own expectations, in their deviations, shape (K,).
+        priors: Residuals of the nuisances' own priors, shape (K,).
         basis: Orthonormal, of all that they do to both, shape (R + K, K).
     """
 
     weight: np.ndarray
-    own: np.ndarray
+    priors: np.ndarray
     basis: np.ndarray
 
     def __call__(self, residuals: np.ndarray) -> np.ndarray:
         """What is left of residuals (N, R), shape (N, R + K): its squares add up to the misfit."""
-        own = np.broadcast_to(self.own, (len(residuals), len(self.own)))
-        gaps = np.concatenate([residuals * self.weight, own], axis=1)
+        priors = np.broadcast_to(self.priors, (len(residuals), len(self.priors)))
+        gaps = np.concatenate([residuals * self.weight, priors], axis=1)
         return gaps - (gaps @ self.basis) @ self.basis.T
 
 

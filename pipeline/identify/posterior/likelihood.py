@@ -289,11 +289,11 @@ class Likelihood:
         gram, right = design @ design.T, design @ left
         every_nuisance = slice(of_phi, None)
         sizes = np.append(tolerances.simulated, np.ones(len(linear)))  # of the nuisances' priors
-        own = np.append(nuisances / tolerances.simulated, np.zeros(len(linear)))
+        priors = np.append(nuisances / tolerances.simulated, np.zeros(len(linear)))
         gram[every_nuisance, every_nuisance] += np.diag(sizes**-2)
-        right[every_nuisance] -= own / sizes
+        right[every_nuisance] -= priors / sizes
         m = slice(of_phi + simulated, None)  # linear
-        cost = left @ left + own @ own
+        cost = left @ left + priors @ priors
         best_linear = np.linalg.solve(gram[m, m], right[m])
         inverse = np.linalg.inv(gram[every_nuisance, every_nuisance])  # C^-1
         effects = np.vstack([design[every_nuisance].T, np.diag(1 / sizes)])
@@ -307,7 +307,7 @@ class Likelihood:
             spread=np.sqrt(np.diag(inverse)[:simulated]),
             residuals=residuals,
             left=(left - best_linear @ design[m]) / weight,
-            elimination=Elimination(weight, own, np.linalg.qr(effects)[0]),
+            elimination=Elimination(weight, priors, np.linalg.qr(effects)[0]),
             uncounted=np.zeros(len(left)),
         )
 

@@ -50,7 +50,7 @@ class Remaining:
     workers: int
 
     def __call__(self, phi: np.ndarray) -> np.ndarray:
-        """Of coordinates (N, D), shape (N, R); NaN where a simulation fails."""
+        """What is left at coordinates (N, D), shape (N, R); NaN where a simulation fails."""
         fitted, parameters = self.fitted, self.coordinates.parameters(phi)
         loss = phi[:, LOSS] - fitted.phi[LOSS]
         left = [
@@ -177,7 +177,7 @@ def samples_of(remaining: Remaining, widened: float, seed: int) -> tuple[np.ndar
 def _resampled(
     batch: np.ndarray, logs: np.ndarray, random: RandomState
 ) -> tuple[np.ndarray, float]:
-    """As many samples (N, D), by the logarithms of their weights (N,), and their effective number.
+    """Draw N of samples (N, D) by the logarithms of their weights (N,); and the effective number.
 
     Systematic resampling: one random number, and even steps from there.
     """
@@ -199,8 +199,10 @@ def _evolved(
     import emcee
 
     # Its snooker move, as of 3.1.6, samples a normal density 7 to 23 % too narrow.
-    chains = emcee.EnsembleSampler(*start.shape, log, vectorize=True, moves=emcee.moves.DEMove())
+    count, axes = start.shape
+    move = emcee.moves.DEMove()
+    chains = emcee.EnsembleSampler(count, axes, log, vectorize=True, moves=move)
     chains.random_state = random.get_state()
-    ends = chains.run_mcmc(start, STEPS, skip_initial_state_check=True)
+    chains.run_mcmc(start, STEPS, skip_initial_state_check=True)
     random.set_state(chains.random_state)
-    return ends.coords
+    return np.asarray(chains.get_last_sample().coords)

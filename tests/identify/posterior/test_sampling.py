@@ -40,7 +40,7 @@ def target(seen=residuals, slopes=SLOPES) -> SimpleNamespace:
 
 
 @pytest.fixture
-def known() -> SimpleNamespace:
+def valley() -> SimpleNamespace:
     return target()
 
 
@@ -57,9 +57,9 @@ def integrated(widened: float = 1.0) -> np.ndarray:
 
 
 @pytest.mark.parametrize("widened", [1.0, 1.3])
-def test_quantiles_of_a_curved_valley_are_those_of_the_integral(known, widened):
+def test_quantiles_of_a_curved_valley_are_those_of_the_integral(valley, widened):
     """The second factor has a long tail upwards, where the Gaussian is even."""
-    (samples, effective, batches), true = samples_of(known, widened, 3), integrated(widened)
+    (samples, effective, batches), true = samples_of(valley, widened, 3), integrated(widened)
     assert true[1, 2] - true[1, 1] > 1.4 * (true[1, 1] - true[1, 0])  # the long tail
     below = np.mean(samples[:, :2, None] / SIZE[:2, None] < true, axis=0)
     error = np.sqrt(np.multiply(LEVELS, 1 - np.array(LEVELS)) / effective)
@@ -68,13 +68,13 @@ def test_quantiles_of_a_curved_valley_are_those_of_the_integral(known, widened):
     assert samples.shape == (SAMPLES, 3) and np.all(samples >= 0)
 
 
-def test_a_coordinate_that_nothing_shows_keeps_its_prior(known):
-    last = samples_of(known, 1.0, 0)[0][:, 2] / SIZE[2]
+def test_a_coordinate_that_nothing_shows_keeps_its_prior(valley):
+    last = samples_of(valley, 1.0, 0)[0][:, 2] / SIZE[2]
     assert np.sqrt(np.mean(last**2)) == pytest.approx(5.0, rel=0.15)
 
 
-def test_the_same_seed_gives_the_same_samples(known):
-    first, again, other = (samples_of(known, 1.0, seed)[0] for seed in (0, 0, 1))
+def test_the_same_seed_gives_the_same_samples(valley):
+    first, again, other = (samples_of(valley, 1.0, seed)[0] for seed in (0, 0, 1))
     np.testing.assert_array_equal(first, again)
     assert np.any(other != first)
 

@@ -14,6 +14,7 @@ from pipeline.base.errors import UserError
 from validation.campaigns.runner import (
     THREADS,
     ResultLines,
+    each,
     made_once,
     prepare,
     results_of,
@@ -75,6 +76,22 @@ def test_an_error_ends_the_run_and_what_was_done_is_kept(tmp_path) -> None:
     with pytest.raises(ValueError, match="a fault of ours"):
         run(broken, [Square(n) for n in range(200)], lines, 1)
     assert lines.where(number=0) and len(lines.lines) < 200
+
+
+def where(_: Square) -> tuple[int, set[int]]:
+    return os.getpid(), os.sched_getaffinity(0)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="no core can be taken here")
+def test_a_process_has_a_core_of_its_own_where_there_are_as_many() -> None:
+    ours = os.sched_getaffinity(0)
+    for workers in (len(ours), len(ours) + 1):
+        cores = dict(each(where, [Square(n) for n in range(8)], workers))
+        if workers == len(ours):
+            taken = [core for some in cores.values() for core in some]
+            assert len(taken) == len(set(taken)) == len(cores) and ours.issuperset(taken)
+        else:
+            assert all(some == ours for some in cores.values())
 
 
 def test_threads_are_as_before_after_the_block(monkeypatch) -> None:

@@ -14,7 +14,8 @@ from concurrent.futures import as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import fields
 from functools import partial
-from multiprocessing import active_children
+from multiprocessing import active_children, get_context
+from multiprocessing.queues import SimpleQueue
 from pathlib import Path
 from threading import Lock
 from typing import TypeVar
@@ -85,6 +86,22 @@ def single_threaded() -> Iterator[None]:
             os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
+def take_core(free: SimpleQueue) -> None:
+    """Keep this process on one core, so that no library starts a thread for each of the others."""
+    os.sched_setaffinity(0, {free.get()})
+
+
+def pool_of(workers: int) -> Pool:
+    """Processes with a core each, where this one may use as many; else wherever they run."""
+    ours = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+    if workers > len(ours):
+        return Pool(workers=workers)
+    free = get_context("spawn").SimpleQueue()
+    for core in ours[:workers]:
+        free.put(core)
+    return Pool(take_core, free, workers=workers)
+
+
 def each(
     work: Callable[[Job], object], jobs: Iterable[Job], workers: int, minutes: float = 1e4
 ) -> Iterator[object]:
@@ -93,7 +110,7 @@ def each(
     Ends early, and says so, when the time is over: what is under way then is lost. Raises what
     `work` raises.
     """
-    with single_threaded(), Pool(workers=workers) as pool:
+    with single_threaded(), pool_of(workers) as pool:
         waiting = {pool.submit(work, job): job for job in jobs}
         try:
             for count, done in enumerate(as_completed(waiting, timeout=60 * minutes), 1):

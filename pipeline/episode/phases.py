@@ -211,7 +211,7 @@ def unseen(seen_phases: Sequence[InteractionPhase]) -> dict[str, str]:
     return {
         what: keeps
         for shown, what, keeps in (
-            (back, NO_UNLOADING, "softening and hysteresis, so the energy that a launch gets back"),
+            (back, NO_UNLOADING, "softening and flow, so the energy that a launch gets back"),
             (pauses, f"no pause of {PAUSE:g} s", "slow relaxation"),
             (speeds, "one speed alone", "how the force depends on speed"),
         )

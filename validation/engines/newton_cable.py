@@ -42,11 +42,12 @@ REPORT, PAGE = Path("reports/validation/export-newton-cable.json"), Path("docs/e
 SETTLE, SETTLE_STEPS, BRAKE = 1e-3, 200, 5e-3  # step [s], steps, damping time [s]
 STEP, STEPS = 1e-4, 800  # step of a launch [s], and how many: all have left by then
 ITERATIONS = 20
+VARIANTS = "identified", "stiffness matched", "stiffness and rest length matched"
 THREAD = 1e-7  # of EA: bending and twisting [m^2], next to nothing
 
 
 def cables(model: CalibratedBand) -> dict[str, SpringChain]:
-    """Cables of a band; `strength` is EA [N], and `mooney_share` and `upturn` mean nothing.
+    """Cables of a band by VARIANTS; `strength` is EA [N], `mooney_share` and `upturn` mean nothing.
 
     With the identified E and rest length; with the stiffness that holds nearest; and with the
     stiffness and the rest length that do.
@@ -57,14 +58,18 @@ def cables(model: CalibratedBand) -> dict[str, SpringChain]:
     area, same = np.pi * model.band.diameter**2 / 4, np.ones_like(tension)
     strain, both = (stretch - 1) / tension, np.stack([stretch, same], axis=1) / tension[:, None]
     slope, constant = np.linalg.lstsq(both, same, rcond=None)[0]  # tension, by relative errors
-    rest = -constant / slope * chain.rest_length
-    return {
-        "identified": replace(chain, strength=model.parameters.sample()["youngs_modulus"] * area),
-        "stiffness matched": replace(chain, strength=float(strain.sum() / (strain @ strain))),
-        "stiffness and rest length matched": replace(
-            chain, strength=float(-constant), rest_length=float(rest)
-        ),
-    }
+    rest = float(-constant / slope * chain.rest_length)
+    return dict(
+        zip(
+            VARIANTS,
+            (
+                replace(chain, strength=model.parameters.sample()["youngs_modulus"] * area),
+                replace(chain, strength=float(strain.sum() / (strain @ strain))),
+                replace(chain, strength=float(-constant), rest_length=rest),
+            ),
+            strict=True,
+        )
+    )
 
 
 def stage(chain: SpringChain, radius: float, place: np.ndarray, *, held: bool) -> str:
@@ -181,7 +186,7 @@ def launched(chain: SpringChain, radius: float, places: np.ndarray) -> list[Shot
 def block(content: dict) -> str:
     """What the page has between its marks: errors from the least to the greatest of all draws."""
     rows = ["| | force held | landing |", "|---|---:|---:|"]
-    for name in next(iter(content["bands"].values())):
+    for name in VARIANTS:
         proof = [draw for band in content["bands"].values() for draw in band[name]["proof"]]
         errors = [[100 * draw[f"{of}_error"] for draw in proof] for of in ("hold_force", "landing")]
         cells = [f"{min(some):+.0f} to {max(some):+.0f} %".replace("-", "−") for some in errors]

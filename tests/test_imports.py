@@ -54,8 +54,7 @@ INSTALLED_AS = {
     "rerun": {"rerun-sdk"},
 }  # packages of extras whose distribution is called otherwise
 INDIRECT = {
-    "newton-usd-schemas": "ovphysx reads scenes by it",
-    "physx-usd-schemas": "the same",
+    "physx-usd-schemas": "ovphysx reads scenes by it",
     "fastapi": "newer ones break Prefect's server",
     "mkdocs-material": "the theme of mkdocs.yml",
     "mkdocstrings": "a plug-in there",

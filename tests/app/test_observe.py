@@ -129,7 +129,7 @@ def test_a_launch_outside_its_interval_is_doubted_before_stages_run(
     assert put.run((-0.4, -0.2), 9.0)["warnings"] == []
 
 
-def test_a_launch_that_fails_in_simulation_is_told(put, monkeypatch, capsys) -> None:
+def test_a_launch_that_fails_in_simulation_is_reported(put, monkeypatch, capsys) -> None:
     summary = {"landing_m": None, "interval_90_m": None, "failure": "the band is slack"}
     monkeypatch.setattr(observe, "prediction_of", lambda *_: summary)
     (warning,) = put.run()["warnings"]

@@ -51,7 +51,7 @@ def planned(tmp_path_factory) -> tuple[Path, Plan]:
 
 
 class FakeFranka:
-    """In franky's place: writes down what it is told, and moves nothing."""
+    """In franky's place: writes down its commands, and moves nothing."""
 
     def __init__(self, grasps: bool = True, follows: bool = True) -> None:
         self.summary: list[tuple] = []

@@ -1,4 +1,4 @@
-"""What a policy is told to be worth: by launches, with failures counted and never averaged in."""
+"""What a policy is said to be worth: by launches, with failures counted and never averaged in."""
 
 from types import SimpleNamespace
 

@@ -149,8 +149,8 @@ def test_a_landing_that_is_no_number_is_refused(toy_map, settings, first: int) -
         train(Broken(), short(settings))
 
 
-def test_each_iteration_is_told(toy_map, settings, tmp_path) -> None:
-    log = tmp_path / "told.log"
+def test_each_iteration_is_logged(toy_map, settings, tmp_path) -> None:
+    log = tmp_path / "progress.log"
     some = short(settings, iterations=3)
     trained = train(toy_map.surface, some, Progress("x", 3, "iterations", log))
     steps = [parse(f"x {line}") for line in log.read_text().splitlines()[1:]]

@@ -93,7 +93,7 @@ def test_no_release() -> None:
         find_release(t, force)
 
 
-def test_a_slip_before_is_no_release_but_is_told() -> None:
+def test_a_slip_before_is_no_release_but_is_reported() -> None:
     """The band slides through the fingers, which costs more than what is left to let go."""
     t, force = pull(7.5, 0.0, 0.03, 3)
     bias = np.array([3.0, -2.0, 7.0])

@@ -1,4 +1,4 @@
-"""Force and motion of formulas: a tool that is felt, a hand that turns, gaps."""
+"""Force and motion of formulas: a tool whose weight is measured, a hand that turns, gaps."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_the_inertia_of_a_hand_that_does_not_turn(params) -> None:
     assert gone.max() < 0.15 and np.median(gone) < 0.01
 
 
-def test_a_tool_that_nobody_told_of_is_felt(params) -> None:
+def test_a_tool_that_nobody_named_is_measured(params) -> None:
     """Its inertia in free motion shows its mass, with which it is gone from the pull, too."""
     played = Played(mass=MASS, truth=Truth(noise=0.005))
     inertia = estimate_tool_inertia(Pull(played.recording(), played.geometry()), None)
@@ -93,7 +93,7 @@ def test_a_tool_that_nobody_told_of_is_felt(params) -> None:
 
 
 def test_a_sensor_that_takes_off_too_much_or_has_the_other_sign(params) -> None:
-    """What is felt is taken off as it is felt, whatever its sign."""
+    """What is measured is taken off as it is measured, whatever its sign."""
     for played in (
         Played(mass=-0.3, truth=Truth(noise=0.005)),
         Played(mass=MASS, truth=Truth(noise=0.005, sign=-1.0)),

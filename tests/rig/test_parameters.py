@@ -23,7 +23,7 @@ COLOR, COLOR_INFO = "/camera/color/image_raw/compressed", "/camera/color/camera_
 DEPTH, DEPTH_INFO = "/camera/depth/image_raw/compressedDepth", "/camera/depth/camera_info"
 PICTURE = {COLOR, DEPTH}
 CAMERA = PICTURE | {COLOR_INFO, DEPTH_INFO}
-FELT = {POSE, WRENCH}  # what moves the hand; whether a pixel changes too is left open
+HAND = {POSE, WRENCH}  # what moves the hand; whether a pixel changes too is left open
 EVERYTHING = CAMERA | {TF, GRIPPER, POSE, WRENCH}
 LANDING = {"landing"}
 DIPS = (Dip(at=0.5, depth=0.05, out_time=0.1, back_time=0.1),)
@@ -31,18 +31,18 @@ DIPS = (Dip(at=0.5, depth=0.05, out_time=0.1, back_time=0.1),)
 HASTE = {"PULL": 1.2, "PULLED": 2, "OPEN": 2.4, "RETREAT": 2.45, "RETREATED": 2.5, "END": 2.55}
 CHANGES = {  # the longest prefix of a number's name counts
     "seed": EVERYTHING | LANDING,
-    "edges": FELT | LANDING,
-    "tolerance": FELT | LANDING,
-    "pads": FELT,
-    "tracking_error": FELT,
+    "edges": HAND | LANDING,
+    "tolerance": HAND | LANDING,
+    "pads": HAND,
+    "tracking_error": HAND,
     "pose_latency": {POSE},
     "release_jitter": LANDING,
     "projectile_drag": LANDING,
     "base": PICTURE | {TF, POSE},
     **{f"base.{i}": {TF, POSE} for i in range(3, 7)},  # turns what is reported, moves nothing
-    "tool_pitch": FELT,
-    "arm": FELT,
-    "arm.stiffness": FELT | LANDING,
+    "tool_pitch": HAND,
+    "arm": HAND,
+    "arm.stiffness": HAND | LANDING,
     "clock": {GRIPPER, POSE, WRENCH},
     "wrench": {WRENCH},
     "wrench.yaw": {TF, WRENCH},
@@ -60,7 +60,7 @@ CHANGES = {  # the longest prefix of a number's name counts
     "camera.edge_fly": {DEPTH},
     "camera.translation_error": {TF},
     "camera.rotation_error": {TF},
-    "bands.band1": FELT | LANDING,
+    "bands.band1": HAND | LANDING,
     "bands.band1.color": {COLOR},
 }
 RUBBER = {  # all that a band can have
@@ -191,7 +191,7 @@ def test_each_number_changes_what_it_should(params, tmp_path, monkeypatch) -> No
     for name in numbers(rig):
         now = everything(changed(rig, name), "landing" in expected(name))
         topics = {topic for topic in now if now[topic] != before[topic]}
-        if FELT <= expected(name) and TF not in expected(name):
+        if HAND <= expected(name) and TF not in expected(name):
             topics -= PICTURE
         if topics != expected(name):
             wrong[name] = topics ^ expected(name)

@@ -47,7 +47,7 @@ def test_the_interval_holds_what_samples_say(world, aimed) -> None:
     assert "no samples" in aimed.warnings[0]
 
 
-def test_what_the_hand_must_do_is_told(world, aimed) -> None:
+def test_what_the_hand_must_do_is_said(world, aimed) -> None:
     hand = LaunchHistory(pull_time=2.0, pause=1.0)
     assert aimed.pull_and_pause is None
     assert aim(replace(world, history=hand), 2.0).pull_and_pause == (2.0, 1.0)

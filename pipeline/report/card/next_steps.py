@@ -18,7 +18,8 @@ from pipeline.report.card.verdict import Reason
 
 LEAST = 0.05  # share of an interval: less is no help
 # To which a dip of 5 to 15 cm tells the softening, where E, the curve's shape, relaxation, and the
-# force's bias, drift, gain and clock are unknown beside it: linear, with 0.11 N a sample.
+# force's bias, drift, gain and clock are unknown beside it: linear, with 0.11 N a sample, without
+# flow. Beside flow it shows the softening less surely, so that the gain is a little too large.
 DIP = "softening", 0.01
 MOST = 5  # sentences
 LAUNCHES = 5

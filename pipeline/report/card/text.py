@@ -32,8 +32,8 @@ def reasons_of(findings: Findings, reasons: list[Reason]) -> list[str]:
         notes.append(inside(findings))
     if not findings.unloaded:
         notes.append(
-            "No recording lets the drawn band back, so that softening keeps its prior: launches"
-            " tell what it leaves."
+            "No recording lets the drawn band back, so that softening and flow keep their priors:"
+            " launches tell what they leave."
         )
     if findings.observed == 1:
         notes.append("One launch is part of the evidence; one is not many.")

@@ -5,15 +5,14 @@ What it is and how it is made: validation/engines/physx/policy.py. It is no part
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 
 import pandas as pd
 
-from pipeline.base.errors import UserError
+from pipeline.report.run.committed import FOLDER, committed
 
-FOLDER, NAME = Path("reports", "validation"), "physx-policy-{}.json"
+NAME, WRITER = "physx-policy-{}.json", "validation.engines.physx.policy"
 FAILED = "did not land"
 
 
@@ -25,18 +24,15 @@ def launched(root: Path, bands: Iterable[str]) -> dict[str, pd.DataFrame]:
     """
     result = {}
     for band in bands:
-        path = root / FOLDER / NAME.format(band)
-        if not path.exists():
+        pairs = committed(root / FOLDER / NAME.format(band), WRITER, _landings)
+        if pairs is None:
             continue
-        try:
-            targets = json.loads(path.read_text(encoding="utf-8"))["targets"]
-            pairs = [(of["target_m"], landing) for of in targets for landing in of["on_rig_m"]]
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise UserError(
-                f"{path}: is not what validation.engines.physx.policy writes ({error!r});"
-                " `git checkout` it"
-            ) from error
         trials = pd.DataFrame(pairs, columns=["target", "landing_y"]).astype(float)
         failure = trials.landing_y.map(lambda landing: None if landing == landing else FAILED)
         result[band] = trials.assign(failure=failure.astype(object))
     return result
+
+
+def _landings(content: dict) -> list[tuple[float, float | None]]:
+    rows = content["targets"]
+    return [(of["target_m"], landing) for of in rows for landing in of["on_rig_m"]]

@@ -5,16 +5,15 @@ What it is and how it is made: validation/campaigns/ablations.py. It is no part 
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.base.errors import UserError
 from pipeline.params import Params
 from pipeline.params.provenance import Change, changes, flat
+from pipeline.report.run.committed import FOLDER, committed
 
-FILE = Path("reports", "validation", "ablations.json")
+FILE, WRITER = FOLDER / "ablations.json", "validation.campaigns.ablations"
 ALL = "all"  # the bands together
 LEVEL = 0.05  # of the corrected p below which a difference counts
 
@@ -66,23 +65,17 @@ class Repeated:
     @classmethod
     def load(cls, root: Path) -> Repeated | None:
         """None where there is no such file. Raises UserError where it is another's."""
-        path = root / FILE
-        if not path.exists():
-            return None
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-            figures, paper = content["figures"], "less_sling2sim2real"
-            return cls(
-                {band: _intervals(figure["methods"]) for band, figure in figures.items()},
-                {band: _differences(figure[paper]) for band, figure in figures.items()},
-                _interval(content["rank_correlation_of_loss_and_miss"]["over_recordings"]),
-                _settings(content["settings"]),
-            )
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-            raise UserError(
-                f"{path}: is not what validation.campaigns.ablations writes ({error!r});"
-                " `git checkout` it"
-            ) from error
+        return committed(root / FILE, WRITER, cls._of)
+
+    @classmethod
+    def _of(cls, content: dict) -> Repeated:
+        figures, paper = content["figures"], "less_sling2sim2real"
+        return cls(
+            {band: _intervals(figure["methods"]) for band, figure in figures.items()},
+            {band: _differences(figure[paper]) for band, figure in figures.items()},
+            _interval(content["rank_correlation_of_loss_and_miss"]["over_recordings"]),
+            _settings(content["settings"]),
+        )
 
     def changed_settings(self, params: Params) -> list[Change]:
         """Where a run has other settings than the campaign: its numbers are not of this run."""

@@ -182,7 +182,7 @@ def test_sizes_that_cannot_be_or_what_fails_with_them_change_nothing(project, ca
     assert len(project.requested) == 1
 
 
-def test_a_recorded_band_among_those_of_all_methods_is_told(project, capsys) -> None:
+def test_a_recorded_band_among_those_of_all_methods_is_reported(project, capsys) -> None:
     project.run(project.recording("a.mcap", "a"), mass=0.04)
     path = project.layout.root / "params.yaml"
     text = path.read_text().replace("  own:", "  own: []", 1).replace("  - a\n", "", 1)

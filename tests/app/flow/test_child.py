@@ -42,7 +42,7 @@ def alive(text: str) -> list[str]:
     return [line for line in output.splitlines() if text in line and not line.startswith("Z")]
 
 
-def test_a_stage_runs_once_and_only_its_own_lines_are_heard(toy: Toy) -> None:
+def test_a_stage_runs_once_and_only_its_own_lines_are_received(toy: Toy) -> None:
     lines: list[str] = []
     assert run(toy, "good", lines)
     assert lines == ["good works"]

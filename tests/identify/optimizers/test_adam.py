@@ -16,7 +16,7 @@ value = quadratic(CENTRE, MATRIX).function
 
 
 def begun(population: int = 6, **settings) -> Adam:
-    """An optimiser that was told of its first batch."""
+    """An optimiser that has the losses of its first batch."""
     optimizer = Adam(D, rollouts=600, seed=1, population=population, **settings)
     optimizer.tell(value(optimizer.ask()))
     return optimizer

@@ -29,7 +29,7 @@ def balls(*centres: float, size: float = 0.01, dimension: int = 3) -> list[Regio
 
 
 def test_all_solvers_ask_as_one_batch_and_learn_their_own_losses() -> None:
-    """Two solvers side by side do what each of them does alone, told the same."""
+    """Two solvers side by side do what each of them does alone, with the same losses."""
     both = Multistart(balls(0.3, 0.7), population=6, seed=5)
     seeds = np.random.SeedSequence(5).generate_state(2)
     single = [

@@ -4,7 +4,7 @@ import numpy as np
 
 
 class RandomSearch:
-    """Uniform random points, whatever they are told."""
+    """Uniform random points, whatever losses they get."""
 
     phase = "random"
 

@@ -57,9 +57,9 @@ def test_everything_evaluated_is_recorded_inside_the_box() -> None:
 
 
 def test_a_box_that_fails_everywhere_is_searched_to_the_end() -> None:
-    """An optimiser is told finite losses even so; only then the failure is said."""
+    """An optimiser gets finite losses even so; only then the failure is said."""
     evaluate = quadratic(CENTRE, np.eye(5), fails=lambda unit: unit[:, 0] >= 0)
-    for name in ("de", "tests.identify.search.own:RandomSearch"):  # which looks at what it is told
+    for name in ("de", "tests.identify.search.own:RandomSearch"):  # which looks at what it gets
         evaluations = alone(name, evaluate, 312)
         assert np.isinf(evaluations.total).all()
         with pytest.raises(UserError, match="each of 312 simulations failed"):
@@ -67,7 +67,7 @@ def test_a_box_that_fails_everywhere_is_searched_to_the_end() -> None:
 
 
 class Recorder:
-    """Asks for batches of sizes that were given, and keeps what it is told."""
+    """Asks for batches of sizes that were given, and keeps the losses that it gets."""
 
     phase = "recorder"
 
@@ -83,7 +83,7 @@ class Recorder:
 
 @given(sizes=st.lists(st.integers(1, 9), min_size=1, max_size=9), data=st.data())
 def test_exactly_the_budget_is_spent(sizes: list[int], data: st.DataObject) -> None:
-    """Whatever sizes are asked for; the batch that is cut is not told."""
+    """Whatever sizes are asked for; the losses of the batch that is cut are not given."""
     rollouts = data.draw(st.integers(1, sum(sizes)))
     recorder, evaluations = Recorder(*sizes), Evaluations("toy", NAMES)
     search(recorder, quadratic(CENTRE, np.eye(5)), evaluations, rollouts=rollouts)

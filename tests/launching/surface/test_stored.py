@@ -1,4 +1,4 @@
-"""Stored policies: what they say, and what a user is told who lacks one."""
+"""Stored policies: what they say, and the message to a user who lacks one."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""The campaign on more recordings: read, shown in tables, and told in sentences."""
+"""The campaign on more recordings: read, shown in tables, and put in sentences."""
 
 import json
 

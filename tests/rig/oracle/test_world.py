@@ -30,7 +30,7 @@ def written(tmp_path: Path):
 
 
 def test_launches_are_those_of_the_rig(written) -> None:
-    """The second fails for its force: no landing, and the map is told why."""
+    """The second fails for its force: no landing, and the map gets the reason."""
     path = written(setup={"max_force": 11.0})
     draws, numbers = np.array([DRAW, [-0.40, -0.25]]), np.array([[7, 8], [9, 10]])
     with World("band1", path, workers=1) as world:

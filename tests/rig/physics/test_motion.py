@@ -68,7 +68,7 @@ def test_a_dip_beyond_the_fork_is_refused() -> None:
 
 
 def test_the_band_follows_a_dip_and_pulls_less_there(coarse: Params) -> None:
-    """It slips after the dip's fingers open; pads that are too weak are told with dips too."""
+    """It slips after the dip's fingers open; pads that are too weak are reported with dips too."""
     string = string_of(coarse, "band1")
     hanging = hang(string, 1e-4)
     dip = Dip(at=1.0, depth=0.1, out_time=1.0, back_time=1.0)

@@ -1,4 +1,4 @@
-"""Flaws are as large as params.yaml says, and what is felt is what statics says."""
+"""Flaws are as large as params.yaml says, and the force measured is what statics says."""
 
 import numpy as np
 import pytest

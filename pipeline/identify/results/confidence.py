@@ -76,6 +76,7 @@ class Confidence(JsonRecord):
     recordings: Annotated[list[RecordingResiduals], FILLED]
     settled: bool
     steps: Count = 0
+    effective_samples: float | None = None
     disagreement: float = 1.0
     correlation: CorrelationMatrix | None = None
     launches: list[LaunchResidual] = []

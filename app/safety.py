@@ -17,6 +17,7 @@ from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
 from pipeline.params import Params
 from pipeline.params.provenance import Change, changed_since, changes, policy_settings_of
+from pipeline.report.card.verdict import FEW_SAMPLES
 from stages.start import stage_of, unmounted
 
 MISS = 0.05  # m from the target, in simulation, from which no pose is given
@@ -107,6 +108,9 @@ def of_confidence(content: dict, path: Path) -> Iterator[Hazard]:
             f"the fit of {path} had not settled after {confidence.get('steps', 'all its')} steps:"
             " its values and intervals may be wrong",
         )
+    elif (effective := confidence.get("effective_samples", np.inf)) < FEW_SAMPLES:
+        what = f"the intervals of {path} rest on {effective:.0f} samples of even weight, too few"
+        yield Hazard("confidence", what)
 
 
 def of_identification(params: Params, content: dict, path: Path) -> Iterator[Hazard]:

@@ -102,6 +102,9 @@ def test_a_posterior_that_has_not_settled_or_is_not_there(tmp_path) -> None:
     content = CONTENT | {"confidence": {"settled": False, "steps": 14}}
     (hazard,) = safety.of_confidence(content, tmp_path / "t.json")
     assert "t.json had not settled after 14 steps" in hazard.what
+    few = CONTENT | {"confidence": {"settled": True, "effective_samples": 0.0}}
+    (hazard,) = safety.of_confidence(few, tmp_path / "t.json")
+    assert "rest on 0 samples" in hazard.what
     for content in (CONTENT | {"confidence": None}, {"theta": VALUES}):
         (hazard,) = safety.of_confidence(content, tmp_path)
         assert hazard.about == "confidence" and "does not tell how well" in hazard.what

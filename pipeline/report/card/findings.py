@@ -47,6 +47,7 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
     return Findings(
         cautions=_cautions(inputs.episodes),
         settled=confidence.get("settled"),
+        effective=confidence.get("effective_samples"),
         force=worst("force_rms"),
         held=worst("held_rms"),
         recoil=worst("recoil_rms"),

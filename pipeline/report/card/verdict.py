@@ -21,6 +21,7 @@ TRUSTED, CARE, NO = "can be trusted", "with care", "no"
 # all: the pictures' expected millimetre stands beside a camera that is known to one or two.
 FORCE, HELD, RECOIL = Tolerances().force, 2 * Tolerances().cloud, 5 * Tolerances().cloud
 NO_FIT = 5.0
+FEW_SAMPLES = 30  # by so many an end of an interval is known to a fifth of its width
 # Recordings of one band differ beyond what each leaves open: intervals are then as much wider.
 DISAGREE = 2.0
 # Of a launch's stretch over the recorded one: within it the law was seen, and shortly beyond.
@@ -63,6 +64,7 @@ class Findings:
     Attributes:
         cautions: Of the recordings, in words, and what would mend them.
         settled: Whether the density's last step was small; None where the method has no density.
+        effective: How many even samples its weighted ones are worth; None where that is not said.
         force, held, recoil: Worst root mean squares of all recordings [N], [m], [m].
         recoil_seen: Whether any picture shows the recoil.
         disagreement: Birge's ratio; `odd` names the recording that the others predict worst.
@@ -88,6 +90,7 @@ class Findings:
 
     cautions: Sequence[tuple[str, str]]
     settled: bool | None
+    effective: float | None
     force: float
     held: float
     recoil: float
@@ -185,6 +188,13 @@ def _identified(findings: Findings):
             False,
             "The fit had not settled when it ended, so values and intervals may still move.",
             "Record a further pull: more evidence makes a fit settle.",
+        )
+    elif findings.effective is not None and findings.effective < FEW_SAMPLES:
+        yield Reason(
+            False,
+            f"The intervals rest on {findings.effective:.0f} samples of even weight, too few to say"
+            " where they end.",
+            "Record a further pull: more evidence makes a density simpler.",
         )
     misfits = (
         ("force of the pull", findings.force, FORCE, "N", 1, "Check the force sensor and its frame,"

@@ -12,7 +12,8 @@ from tests.report.card.conftest import trials
 
 GOOD = Findings(
     cautions=(),
-    settled=True, force=0.05, held=8e-4, recoil=2e-3, recoil_seen=True, disagreement=1.1, odd="",
+    settled=True, effective=150.0,
+    force=0.05, held=8e-4, recoil=2e-3, recoil_seen=True, disagreement=1.1, odd="",
     at_sides=(),
     stretch=1.5, recorded_stretch=1.6, hold_force=9.0, max_force=30.0, failures=(), converged=True,
     miss=0.004, half_width=0.1, outside=1, scores=15, off=0.03, bias=-0.01, bias_error=0.01,
@@ -23,6 +24,7 @@ CASES = [
     ({"cautions": (("In pull 1 of a.mcap, the force drifts.", "Warm up."),)}, CARE, "force drifts"),
     ({"settled": None}, CARE, "does not tell how sure"),
     ({"settled": False}, CARE, "not settled"),
+    ({"effective": 3.2}, CARE, "rest on 3 samples"),
     ({"force": 0.2}, CARE, "force of the pull: 0.2 N off"),
     ({"force": 0.9}, NO, "does not meet the force"),
     ({"held": 3e-3}, CARE, "band in the hand: 3 mm off"),

@@ -38,7 +38,7 @@ from pipeline.simulator.rubber import RUBBER, uniaxial
 DRAWS = 20  # of the prior
 PLACES = 9  # of a draw that are tried for the targets
 SOFTENING = "softening", (0.0, 0.6)  # free, whatever the method fixes, and its bounds
-FELT = (*LOGS, *LAWS[RUBBER])  # what a pull's force shows
+SHOWN_BY_FORCE = (*LOGS, *LAWS[RUBBER])  # what a pull's force shows
 MOST_DIPS = 3
 FIRST, SHALLOW, DEEPEST = 0.5, 0.05, 0.9  # shares: where a dip may begin, and how deep it may go
 SLOWER, SLOWEST = 2.0, 4.0  # s of a leg: of the coarse set, and at most
@@ -165,7 +165,7 @@ class PullDesign:
         None at draws at which a simulation does not reach its end.
         """
         episode, steps = self.episode(dips), self.coordinates.steps
-        affected = [i for i, name in enumerate(self.coordinates.names) if name in FELT]
+        affected = [i for i, name in enumerate(self.coordinates.names) if name in SHOWN_BY_FORCE]
         moved = np.vstack([0 * steps, np.diag(steps)[affected]])
         count, size = len(self.phi), len(moved)
         around = (self.phi[:, None] + moved).reshape(count * size, -1)

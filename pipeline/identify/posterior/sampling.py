@@ -96,7 +96,7 @@ def samples_around(
 
 
 @dataclass(frozen=True)
-class ResponseSurface:
+class QuadraticSurface:
     """Residuals as quadratic polynomials of the coordinates, in units of a scale around a centre.
 
     Attributes:
@@ -116,7 +116,7 @@ class ResponseSurface:
         phi: np.ndarray,
         left: np.ndarray,
         weight: np.ndarray,
-    ) -> ResponseSurface:
+    ) -> QuadraticSurface:
         """Fit residuals `left` (N, R) at coordinates (N, D), each of a weight, by least squares."""
         terms = _terms((phi - centre) / scale)
         ridge = np.where(np.arange(terms.shape[1]) > len(centre), RIDGE, 1e-9)
@@ -169,7 +169,7 @@ def samples_of(remaining: Remaining, widened: float, seed: int) -> tuple[np.ndar
             break
         density = log(phi[good], np.sum(left[good] ** 2, axis=1))
         weight = np.exp(TEMPER * (density - density.max()))
-        surface = ResponseSurface.fitted(fitted.phi, scale, phi[good], left[good], weight)
+        surface = QuadraticSurface.fitted(fitted.phi, scale, phi[good], left[good], weight)
         batch = _evolved(lambda at, by=surface: log(at, by.misfit(at)), batch, random)
     return *best, count
 

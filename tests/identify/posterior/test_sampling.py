@@ -8,7 +8,7 @@ import pytest
 from numpy.random import RandomState
 
 from pipeline.identify.posterior import sampling
-from pipeline.identify.posterior.sampling import SAMPLES, ResponseSurface, samples_of
+from pipeline.identify.posterior.sampling import SAMPLES, QuadraticSurface, samples_of
 from tests.identify.posterior.toy import SIZE, space
 
 AT, PRODUCT, RATHER = np.array([20.0, 10.0, 0.0]), 0.03, 0.25  # the mode, and two deviations
@@ -92,7 +92,7 @@ def test_a_surface_is_exact_of_second_order_and_weights_choose_where_else():
     x = rng.normal(0, 1, (200, 3))
     centre, scale = np.array([1.0, 2.0, 3.0]), np.array([0.1, 10.0, 1.0])
     even = np.stack([1 + x[:, 0] * x[:, 1], 3 * x[:, 2] - x[:, 2] ** 2], axis=1)
-    surface = ResponseSurface.fitted(centre, scale, centre + scale * x, even, np.ones(200))
+    surface = QuadraticSurface.fitted(centre, scale, centre + scale * x, even, np.ones(200))
     there = rng.normal(0, 1, (50, 3))
     true = (1 + there[:, 0] * there[:, 1]) ** 2 + (3 * there[:, 2] - there[:, 2] ** 2) ** 2
     np.testing.assert_allclose(surface.misfit(centre + scale * there), true, rtol=2e-2, atol=2e-2)
@@ -100,7 +100,7 @@ def test_a_surface_is_exact_of_second_order_and_weights_choose_where_else():
     near = np.exp(-2 * np.sum(x**2, axis=1))
     offs = []
     for weight in (np.ones(200), near):
-        surface = ResponseSurface.fitted(centre, scale, centre + scale * x, cubic, weight)
+        surface = QuadraticSurface.fitted(centre, scale, centre + scale * x, cubic, weight)
         point = centre + scale * [0.3, 0, 0]
         offs.append(abs(surface.misfit(point[None])[0] - 0.3**6))
     assert offs[1] < offs[0] / 3

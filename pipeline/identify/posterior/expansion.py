@@ -12,7 +12,7 @@ UNLIKE = 0.05  # an autocorrelation that is none
 
 
 @dataclass(frozen=True)
-class Elimination:
+class NuisanceProjection:
     """Takes what K nuisances explain out of residuals: least squares, by its QR decomposition.
 
     Attributes:
@@ -53,7 +53,7 @@ class Expansion:
     spread: np.ndarray
     residuals: Residuals
     left: np.ndarray
-    elimination: Elimination
+    elimination: NuisanceProjection
     uncounted: np.ndarray
 
     def rms(self, part: str) -> float:

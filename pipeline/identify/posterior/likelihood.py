@@ -22,7 +22,7 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.alignment import recoil_seen
 from pipeline.identify.posterior.coordinates import LOSS
-from pipeline.identify.posterior.expansion import Elimination, Expansion
+from pipeline.identify.posterior.expansion import NuisanceProjection, Expansion
 from pipeline.identify.posterior.residuals import Residuals, Rule
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.model import ClampedBand
@@ -307,7 +307,7 @@ class Likelihood:
             spread=np.sqrt(np.diag(inverse)[:simulated]),
             residuals=residuals,
             left=(left - best_linear @ design[m]) / weight,
-            elimination=Elimination(weight, priors, np.linalg.qr(effects)[0]),
+            elimination=NuisanceProjection(weight, priors, np.linalg.qr(effects)[0]),
             uncounted=np.zeros(len(left)),
         )
 

@@ -22,7 +22,7 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.alignment import recoil_seen
 from pipeline.identify.posterior.coordinates import LOSS
-from pipeline.identify.posterior.expansion import NuisanceProjection, Expansion
+from pipeline.identify.posterior.expansion import Expansion, NuisanceProjection
 from pipeline.identify.posterior.residuals import Residuals, Rule
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.model import ClampedBand

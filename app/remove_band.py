@@ -27,7 +27,7 @@ def remove_band(name: str, agreed: Callable[[list[str]], bool], root: Path | str
 
     Args:
         name: Of the band.
-        agreed: Told what is to be removed, a line each, says whether it may.
+        agreed: Gets what is to be removed, a line each, and says whether it may.
         root: Of the project.
 
     Returns:

@@ -34,7 +34,7 @@ def summary(params):
         )
         return precision + hessian, gradient
 
-    precision = np.diag(coordinates.precision + 1e2)  # as if recordings told each within 0.1
+    precision = np.diag(coordinates.precision + 1e2)  # as if recordings showed each within 0.1
     return coordinates.names, precision, by
 
 

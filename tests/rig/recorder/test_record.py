@@ -30,7 +30,7 @@ PICTURES = [
     "/camera/depth/image_raw/compressedDepth",
 ]
 
-FELT = ("/tf_static", "/franka_robot_state_broadcaster/current_pose", "/ft_sensor/wrench")
+FORCE_TOPICS = ("/tf_static", "/franka_robot_state_broadcaster/current_pose", "/ft_sensor/wrench")
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +142,7 @@ def test_force_peaks_as_the_papers_and_the_same_seed_gives_the_same_bytes(
     stated = {12.18: messages}
     for name, band, peak in (("a", "band2", 14.25), ("b", "band2", 14.25), ("c", "band3", 16.70)):
         record(quick, band, tmp_path / name, picture_scale=0.1)
-        stated[peak] = stated.get(peak) or read(tmp_path / name, *FELT)
+        stated[peak] = stated.get(peak) or read(tmp_path / name, *FORCE_TOPICS)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
     for peak, received in stated.items():
         smooth = np.convolve(response(received)[:, 1], np.ones(50) / 50, "same")

@@ -45,13 +45,16 @@ STEPS = {  # of finite differences
     "turn_damping": 0.5,
     "log_returned_share": 0.01,
 }
-# Of 9 in 10 natural and silicone rubbers at 10 to 100 Hz, by
+# Of 9 in 10 rubbers at 10 to 100 Hz: the range from butadiene to butyl rubber, by
 # https://materialmap.github.io/rubber_damping_reference.html.
 # A band with both ends held swings at pi c/L, where its damping s d makes tan delta = pi s d c/L.
-TAN_DELTA = 0.05, 0.30
+TAN_DELTA = 0.03, 0.50
 MOST_DRAG, MOST_LOST = 8.0, 0.3  # 1/s, of a logarithm
 PRIORS = {  # mean and standard deviation of Gaussians
-    "log_loss_factor": (np.log(np.sqrt(np.prod(TAN_DELTA)) / np.pi), np.log(6) / 2 / 1.645),
+    "log_loss_factor": (
+        np.log(np.sqrt(np.prod(TAN_DELTA)) / np.pi),
+        np.log(TAN_DELTA[1] / TAN_DELTA[0]) / 2 / 1.645,
+    ),
     # half-normals: slow cycles of elastomers return 64 to 82 % (10.5281/zenodo.14717689), by
     # softening alone 1 - 0.59 s, and by flow alone 1 - 2 flow or more
     "softening": (0.0, 0.3),

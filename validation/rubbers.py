@@ -3,8 +3,8 @@
 A seed draws their laws, spectra, sizes and masses. DEVELOP is what a method may be developed on.
 SEALED is run once, with the default method as it then stands, and all of it is reported; a method
 that is changed after it was seen wants another seed. Six were spent so: 20261102, 20261124,
-20261207, 20270118, 20270305 and SPENT, whose rubbers now serve to explain. The sealed ones have elastic laws
-that no other rubber has, and every second one softens, half of these by strain
+20261207, 20270118, 20270305 and SPENT, whose rubbers now serve to explain. The sealed ones have
+elastic laws that no other rubber has, and every second one softens, half of these by strain
 (rig/physics/rubber.py), which no other does either.
 
 The rules, written before any of these sealed rubbers was run:

@@ -174,13 +174,7 @@ def written(trained, training: dict, **theta) -> dict:
     params = load(DEFAULTS)
     content = {"theta": dict.fromkeys(THETA, 0.4), **theta}
     made = card(
-        trained.policy,
-        params,
-        "band1",
-        "ours",
-        content,
-        training=training,
-        landing_map=MAP,
+        trained.policy, params, "band1", "ours", content, training=training, landing_map=MAP
     )
     return json.loads(json.dumps(made, allow_nan=False))
 

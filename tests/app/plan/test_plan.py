@@ -222,11 +222,7 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("section", "values", "expected"),
     [
-        (
-            "plan",
-            {"draw": (-0.6, 0.0)},
-            "y = -0.6 m lies 0.15 m beyond the -0.45 m of setup.draw",
-        ),
+        ("plan", {"draw": (-0.6, 0.0)}, "y = -0.6 m lies 0.15 m beyond the -0.45 m of setup.draw"),
         ("plan", {"draw": (-0.3, -0.4)}, "z = -0.4 m lies 0.1 m beyond the -0.3 m of setup.draw_z"),
         ("plan", {"draw": (-0.3, 0.5)}, "z = 0.5 m lies 0.5 m beyond the 0 m of setup.draw_z"),
         ("plan", {"draw": (-1e-300, 0.0)}, "draw by 0.251 m at least, not 0.000 m"),

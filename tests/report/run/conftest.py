@@ -111,10 +111,7 @@ def posterior() -> dict:
     """Samples within ± 10 % of θ."""
     spread = np.linspace(0.9, 1.1, 41)
     theta = np.array(list(THETA.values()))
-    return {
-        "names": list(NAMES),
-        "samples": (theta * spread[:, None]).tolist(),
-    }
+    return {"names": list(NAMES), "samples": (theta * spread[:, None]).tolist()}
 
 
 @pytest.fixture(scope="session")

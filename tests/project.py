@@ -13,6 +13,9 @@ from pipeline.params.identification import steps_of
 from pipeline.params.lab import StepParams
 from validation.projects import DEFAULTS, environment, wait
 
+# What params.yaml has of a band of one's own.
+BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
+
 
 def python(*arguments: str | Path, folder: Path = ROOT, **more: str) -> subprocess.CompletedProcess:
     """Run Python in `folder`, with `more` in its environment."""
@@ -44,6 +47,31 @@ def with_(params: Params, section: str, **values: object) -> Params:
     inner = getattr(params, first)
     inner = with_(inner, rest, **values) if rest else inner.model_copy(update=values)
     return params.model_copy(update={first: inner})
+
+
+def write_files(folder: Path, files: dict[str, str]) -> None:
+    """Write texts by their paths below `folder`."""
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """All files below `folder`."""
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def git(folder: Path, *words: str) -> str:
+    """What Git prints in `folder`, in whose commits nobody has a name of his own."""
+    who = ("-c", "user.name=A", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false")
+    done = subprocess.run(["git", *who, *words], cwd=folder, check=True, capture_output=True)
+    return done.stdout.decode().strip()
+
+
+def commit_all(folder: Path) -> None:
+    """A Git repository whose only commit has all that is there."""
+    for words in (("init", "-q"), ("add", "-A"), ("commit", "-qm", "first")):
+        git(folder, *words)
 
 
 def until(happens: Callable[[], object], seconds: float = 90.0):

@@ -8,7 +8,7 @@ import pytest
 from app.preflight.add_band import add_band
 from pipeline.base.errors import UserError
 from pipeline.params import load
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, content
 
 
 @pytest.fixture
@@ -24,10 +24,6 @@ def project(tmp_path: Path) -> Path:
         text = text.replace(old, new)
     (tmp_path / "params.yaml").write_text(text)
     return tmp_path
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
 def add(project: Path, recording: Path, name: str = "red", **changes) -> str:

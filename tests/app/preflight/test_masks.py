@@ -17,7 +17,8 @@ from app.flow import child
 from app.preflight.command import check
 from app.preflight.recordings import add_recording
 from pipeline.base.errors import UserError
-from tests.app.preflight.test_add_band import add, content, project
+from tests.app.preflight.test_add_band import add, project
+from tests.project import content
 from tests.recording.joined import joined
 from validation.recordings.bag import Truth, blind_bag
 

@@ -152,6 +152,24 @@ def template(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
+def no_simulation(monkeypatch) -> None:
+    from pipeline.report.run import report
+    from tests.report.run.toy_replay import toy_landscape, toy_replay
+
+    monkeypatch.setattr(report, "replay_method", toy_replay)
+    monkeypatch.setattr(report, "landscape", toy_landscape)
+
+
+@pytest.fixture
+def text_alone(monkeypatch) -> None:
+    """Pictures and the page take seconds, and tell a test of the text nothing."""
+    from pipeline.report.run import report, write
+
+    monkeypatch.setattr(report.Report, "picture", lambda _, name, *__: f"{name}.png")
+    monkeypatch.setattr(write, "write_page", lambda *_: None)
+
+
+@pytest.fixture
 def root(template: Path, tmp_path: Path) -> Path:
     """A copy of the template, to change."""
     return shutil.copytree(template, tmp_path, dirs_exist_ok=True)

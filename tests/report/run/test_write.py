@@ -11,25 +11,13 @@ import pandas as pd
 import pytest
 
 from pipeline.base.layout import NotMade
-from pipeline.report.run import report as reporting
 from pipeline.report.run import write as writing
 from tests.report.run.conftest import BAND, METHOD
-from tests.report.run.toy_replay import toy_landscape, toy_replay
 
 THETA_FILE = f"data/theta/{BAND}/{METHOD}.json"
 
 
-@pytest.fixture(autouse=True)
-def no_simulation(monkeypatch) -> None:
-    monkeypatch.setattr(reporting, "replay_method", toy_replay)
-    monkeypatch.setattr(reporting, "landscape", toy_landscape)
-
-
-@pytest.fixture
-def text_alone(monkeypatch) -> None:
-    """Pictures and the page take seconds, and tell a test of the text nothing."""
-    monkeypatch.setattr(reporting.Report, "picture", lambda _, name, *__: f"{name}.png")
-    monkeypatch.setattr(writing, "write_page", lambda *_: None)
+pytestmark = pytest.mark.usefixtures("no_simulation")
 
 
 def written(root, params) -> str:

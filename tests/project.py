@@ -2,13 +2,13 @@
 
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import psutil
 
 from pipeline.base.code import ROOT
-from pipeline.params import Params
 from pipeline.params.identification import steps_of
 from pipeline.params.lab import StepParams
 from validation.projects import DEFAULTS, environment, wait
@@ -41,12 +41,13 @@ def set_methods(content: dict, methods: list[str], ablations: list[str] | tuple 
                     place[key][step].append(name)
 
 
-def with_(params: Params, section: str, **values: object) -> Params:
-    """`params` with other values in a section, such as rig.camera."""
+def with_(params: Any, section: str, **values: object) -> Any:
+    """`params` with other values in a section, such as rig.camera or bands.band1."""
     first, _, rest = section.partition(".")
-    inner = getattr(params, first)
+    named = isinstance(params, Mapping)
+    inner = params[first] if named else getattr(params, first)
     inner = with_(inner, rest, **values) if rest else inner.model_copy(update=values)
-    return params.model_copy(update={first: inner})
+    return {**params, first: inner} if named else params.model_copy(update={first: inner})
 
 
 def write_files(folder: Path, files: dict[str, str]) -> None:

@@ -244,8 +244,7 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
 )
 def test_what_is_refused_and_how_it_is_said(params, section, values, expected) -> None:
     if section == "bands":
-        values = {"band1": params.bands["band1"].model_copy(update={"diameter": 0.09})}
-        changed = params.model_copy(update={"bands": values})
+        changed = with_(params, "bands.band1", diameter=0.09)
     else:
         changed = with_(params, section, **values)
     with pytest.raises(UserError) as error:

@@ -2,16 +2,19 @@
 
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import psutil
 
 from pipeline.base.code import ROOT
-from pipeline.params import Params
 from pipeline.params.identification import steps_of
 from pipeline.params.lab import StepParams
 from validation.projects import DEFAULTS, environment, wait
+
+# What params.yaml has of a band of one's own.
+BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
 
 
 def python(*arguments: str | Path, folder: Path = ROOT, **more: str) -> subprocess.CompletedProcess:
@@ -38,12 +41,38 @@ def set_methods(content: dict, methods: list[str], ablations: list[str] | tuple 
                     place[key][step].append(name)
 
 
-def with_(params: Params, section: str, **values: object) -> Params:
-    """`params` with other values in a section, such as rig.camera."""
+def with_(params: Any, section: str, **values: object) -> Any:
+    """`params` with other values in a section, such as rig.camera or bands.band1."""
     first, _, rest = section.partition(".")
-    inner = getattr(params, first)
+    named = isinstance(params, Mapping)
+    inner = params[first] if named else getattr(params, first)
     inner = with_(inner, rest, **values) if rest else inner.model_copy(update=values)
-    return params.model_copy(update={first: inner})
+    return {**params, first: inner} if named else params.model_copy(update={first: inner})
+
+
+def write_files(folder: Path, files: dict[str, str]) -> None:
+    """Write texts by their paths below `folder`."""
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """All files below `folder`."""
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def git(folder: Path, *words: str) -> str:
+    """What Git prints in `folder`, in whose commits nobody has a name of his own."""
+    who = ("-c", "user.name=A", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false")
+    done = subprocess.run(["git", *who, *words], cwd=folder, check=True, capture_output=True)
+    return done.stdout.decode().strip()
+
+
+def commit_all(folder: Path) -> None:
+    """A Git repository whose only commit has all that is there."""
+    for words in (("init", "-q"), ("add", "-A"), ("commit", "-qm", "first")):
+        git(folder, *words)
 
 
 def until(happens: Callable[[], object], seconds: float = 90.0):

@@ -13,6 +13,7 @@ from ruamel.yaml import YAML
 from pipeline.base import code as of_project
 from pipeline.base.code import CODE, NESTED, ROOT, UNTRACKED, closure, concern, files_of
 from stages.start import ungrouped
+from tests.project import write_files
 from tools import architecture
 from tools.closure import BY_NAME, folders, script_of
 
@@ -214,9 +215,7 @@ def test_closure_follows_every_form_of_import(tmp_path: Path) -> None:
         "pipeline/e/__init__.py": "",
         "pipeline/e/other.cpp": "",
     }
-    for name, text in files.items():
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text(text)
+    write_files(tmp_path, files)
     expected = set(files) - {
         "pipeline/a/unused.py",
         "pipeline/e/__init__.py",

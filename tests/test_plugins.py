@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.project import python
+from tests.project import python, write_files
 
 FOREIGN = {
     "foreign.py": "import a_module_that_nobody_has",
@@ -17,9 +17,7 @@ PASSES = "def test_it():\n    pass\n"
 @pytest.fixture
 def foreign(tmp_path: Path) -> str:
     """A folder for PYTHONPATH."""
-    for name, text in FOREIGN.items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text(text)
+    write_files(tmp_path, FOREIGN)
     return str(tmp_path)
 
 

@@ -10,7 +10,7 @@ from app import cli, observe
 from app.flow import child
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, with_
 
 DRAW, LANDING = (-0.3, -0.17), 2.2
 
@@ -150,10 +150,7 @@ def test_a_draw_deeper_than_any_before_is_told_once(put, params, monkeypatch, ca
     assert "count as of the softened band" in first and "0.402 m was the most" in second
     assert capsys.readouterr().err == f"warning: {first}\nwarning: {second}\n"
 
-    bands = params.bands | {
-        "band1": params.bands["band1"].model_copy(update={"preconditioned": True})
-    }
-    preconditioned = params.model_copy(update={"bands": bands})
+    preconditioned = with_(params, "bands.band1", preconditioned=True)
     stays = preconditioned.methods["least_squares"].model_copy(update={"fixed": {"softening": 0.0}})
     for whole, draw, words in (
         (preconditioned, (-0.6, 0.0), None),

@@ -10,9 +10,8 @@ from app.preflight.add_band import _with_band
 from app.remove_band import remove_band
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
-from tests.project import DEFAULTS
+from tests.project import BAND, DEFAULTS, content
 
-BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
 OTHERS = ("orange_2", "band1")
 
 
@@ -47,10 +46,6 @@ def put(root: Path, band: str) -> list[Path]:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(band)
     return files
-
-
-def content(root: Path) -> dict[Path, bytes]:
-    return {file: file.read_bytes() for file in root.rglob("*") if file.is_file()}
 
 
 def test_all_of_a_band_goes_and_nothing_else(project: Path) -> None:

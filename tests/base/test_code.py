@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pipeline.base.code import digest, digests
 from pipeline.base.environment import SIMULATOR, environment
-from tests.project import ROOT
+from tests.project import ROOT, write_files
 
 FILES = {
     "validation/bench/a.py": "from pipeline.simulator import solver\n",
@@ -20,9 +20,7 @@ FILES = {
 
 
 def test_digests_are_of_what_is_imported_and_follow_its_changes(tmp_path: Path) -> None:
-    for name, text in FILES.items():
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text(text)
+    write_files(tmp_path, FILES)
     script = tmp_path / "validation/bench/a.py"
     before = digests(script, root=tmp_path)
     assert [*before] == ["pipeline/simulator", "rig/arm", "validation/bench/a.py"]

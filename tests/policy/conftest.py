@@ -1,4 +1,3 @@
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -39,10 +38,7 @@ def toy_map() -> LandingMap:
 def trained(toy_map, tmp_path_factory: pytest.TempPathFactory):
     from pipeline.policy.train import train
 
-    def make(_: Path):
-        return train(toy_map.surface, SETTINGS)
-
-    return once.value(tmp_path_factory, "trained", make)
+    return once.value(tmp_path_factory, "trained", lambda _: train(toy_map.surface, SETTINGS))
 
 
 @pytest.fixture(scope="session")
@@ -50,7 +46,8 @@ def seeing(toy_map, tmp_path_factory: pytest.TempPathFactory):
     """A policy that sees the projectile too."""
     from pipeline.policy.train import train
 
-    def make(_: Path):
-        return train(toy_map.surface, SETTINGS, projectile=toy.START)
-
-    return once.value(tmp_path_factory, "seeing", make)
+    return once.value(
+        tmp_path_factory,
+        "seeing",
+        lambda _: train(toy_map.surface, SETTINGS, projectile=toy.START),
+    )

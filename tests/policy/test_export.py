@@ -44,16 +44,24 @@ def apart(code: str, folder: Path, **environment: str) -> str:
     return done.stdout
 
 
-def test_onnx_and_torchscript_agree_with_the_network(trained, stored, folder) -> None:
-    """On 1,000 targets to 1e-5 m; and it is a network that has learned to hit."""
+def answers(policy, folder: Path, **given: np.ndarray) -> np.ndarray:
+    """What the ONNX file answers to its inputs, as TorchScript and the network do to 1e-5 m."""
+    tensors = [torch.from_numpy(array) for array in given.values()]
     with torch.inference_mode():
-        network = trained.policy(torch.from_numpy(TARGETS)).numpy()
-        script = torch.jit.load(folder / "policy.pt")(torch.from_numpy(TARGETS)).numpy()
+        network = policy(*tensors).numpy()
+        script = torch.jit.load(folder / "policy.pt")(*tensors).numpy()
     session = onnxruntime.InferenceSession(folder / "policy.onnx")
-    graph = session.run(["draw"], {"target": TARGETS})[0]
+    assert [port.name for port in session.get_inputs()] == list(given)
+    graph = session.run(["draw"], given)[0]
     assert network.shape == script.shape == graph.shape == (1000, 2)
     np.testing.assert_allclose(script, network, rtol=0, atol=1e-5)
     np.testing.assert_allclose(graph, network, rtol=0, atol=1e-5)
+    return graph
+
+
+def test_onnx_and_torchscript_agree_with_the_network(trained, stored, folder) -> None:
+    """On 1,000 targets to 1e-5 m; and it is a network that has learned to hit."""
+    graph = answers(trained.policy, folder, target=TARGETS)
     np.testing.assert_array_equal(stored.draws(TARGETS[:, 0]), graph.astype(float))
     landing = toy.launch(graph.astype(float)).landing_y
     assert np.abs(landing - TARGETS[:, 0]).mean() < 0.02
@@ -68,16 +76,7 @@ def test_a_policy_that_sees_the_projectile_agrees_too(seeing, tmp_path) -> None:
     onnx.checker.check_model(onnx.load(stored.folder / "policy.onnx"), full_check=True)
     random = np.random.default_rng(1)
     places = random.uniform((-0.2, -0.3), (0.1, -0.1), (1000, 2)).astype(np.float32)
-    given = {"projectile": places, "target": TARGETS}
-    tensors = [torch.from_numpy(array) for array in given.values()]
-    with torch.inference_mode():
-        network = seeing.policy(*tensors).numpy()
-        script = torch.jit.load(stored.folder / "policy.pt")(*tensors).numpy()
-    session = onnxruntime.InferenceSession(stored.folder / "policy.onnx")
-    assert [port.name for port in session.get_inputs()] == list(given)
-    graph = session.run(["draw"], given)[0]
-    np.testing.assert_allclose(script, network, rtol=0, atol=1e-5)
-    np.testing.assert_allclose(graph, network, rtol=0, atol=1e-5)
+    graph = answers(seeing.policy, stored.folder, projectile=places, target=TARGETS)
     draws = stored.draws(TARGETS[:, 0])
     np.testing.assert_allclose(draws, seeing.policy.draws(TARGETS[:, 0]), rtol=0, atol=1e-5)
     assert np.abs(draws - graph).max() > 1e-3  # so the position counts
@@ -174,13 +173,7 @@ def written(trained, training: dict, **theta) -> dict:
     params = load(DEFAULTS)
     content = {"theta": dict.fromkeys(THETA, 0.4), **theta}
     made = card(
-        trained.policy,
-        params,
-        "band1",
-        "ours",
-        content,
-        training=training,
-        landing_map=MAP,
+        trained.policy, params, "band1", "ours", content, training=training, landing_map=MAP
     )
     return json.loads(json.dumps(made, allow_nan=False))
 

@@ -12,7 +12,7 @@ from pipeline.params import Params, load
 from pipeline.recording.build import Checked, episode_of, process
 from pipeline.recording.masks.ridge import RidgeMask
 from tests import once
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, with_
 from validation.recordings.bag import Truth, write_bag
 
 
@@ -20,8 +20,7 @@ from validation.recordings.bag import Truth, write_bag
 def params() -> Params:
     """The project's parameters with a window that suits the small recordings."""
     whole = load(DEFAULTS)
-    episode = whole.episode.model_copy(update={"duration": 3.6, "samples": 120, "tail": 0.5})
-    return whole.model_copy(update={"episode": episode})
+    return with_(whole, "episode", duration=3.6, samples=120, tail=0.5)
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ from pipeline.recording.build import build_episodes, episode_of, process, proces
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.pulls import Pull
 from pipeline.recording.signals import signals_of
+from tests.project import with_
 from validation.recordings.bag import EYE, Truth, blind_bag, edit, scores
 
 
@@ -67,9 +68,8 @@ def test_recordings_that_cannot_be_used(tmp_path, params, truth, words) -> None:
 
 def test_a_window_that_is_too_long_or_too_short(blind, params) -> None:
     for duration, words in ((8.0, "record for longer"), (1.5, "pull faster")):
-        episode = params.episode.model_copy(update={"duration": duration, "longest": duration})
         with pytest.raises(UserError, match=words):
-            signals(blind[0], params.model_copy(update={"episode": episode}))
+            signals(blind[0], with_(params, "episode", duration=duration, longest=duration))
 
 
 def test_a_wrong_frame_of_the_wrench_is_noticed(tmp_path, params) -> None:
@@ -94,9 +94,8 @@ def test_bytes_are_reproducible_and_come_back(episode, seen, params, tmp_path) -
 
 
 def test_an_unknown_mask_is_refused_by_name(seen, params) -> None:
-    cloud = params.cloud.model_copy(update={"mask": "sam3"})
     with pytest.raises(UserError, match="sam3"):
-        build_episodes(seen[0], "band1", params.model_copy(update={"cloud": cloud}))[0][0]
+        build_episodes(seen[0], "band1", with_(params, "cloud", mask="sam3"))
 
 
 def test_a_late_camera_is_put_right_and_it_is_said(episode, seen, params) -> None:

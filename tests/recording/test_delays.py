@@ -16,6 +16,7 @@ from pipeline.recording.input.reader import read_recording
 from pipeline.recording.pulls import Pull
 from pipeline.recording.release_pictures import ReleasePictures
 from pipeline.recording.tool_inertia import ToolInertia, estimate_tool_inertia
+from tests.project import with_
 from tests.recording.played import Played
 from validation.recordings.bag import Truth
 
@@ -157,9 +158,7 @@ def test_two_estimates_are_weighed_or_said(looked_at, params, monkeypatch, back,
 
 
 def given(params, **delays):
-    summary = params.episode.delays.model_copy(update=delays)
-    episode = params.episode.model_copy(update={"delays": summary})
-    return params.model_copy(update={"episode": episode})
+    return with_(params, "episode.delays", **delays)
 
 
 def test_given_delays_that_are_right_are_kept(looked_at, params) -> None:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import foxglove
 import numpy as np
 import pytest
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
 
 from pipeline.episode.episode import Episode
 from pipeline.recording.build import build_episodes
@@ -67,36 +63,15 @@ CONTAINERS = {
 def test_every_container(container, blind, params, tmp_path) -> None:
     path = tmp_path / "other.mcap"
     translate(blind[0], path, "protobuf", **CONTAINERS[container])
-    assert_same_recording(read_recording(path, params.setup), blind[0], params)
+    assert_same_recording(*(read_recording(file, params.setup) for file in (path, blind[0])))
 
 
-def test_a_bag_of_rosbags(blind, params, tmp_path) -> None:
-    """What rosbags writes, message by message, from what mcap-ros2-support wrote."""
-    from mcap.reader import make_reader
-
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    folder = tmp_path / "bag"
-    with (
-        Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer,
-        blind[0].open("rb") as file,
-    ):
-        connections = {}
-        for schema, channel, message in make_reader(file).iter_messages():
-            if channel.topic not in connections:
-                connections[channel.topic] = writer.add_connection(
-                    channel.topic, schema.name, typestore=store
-                )
-            writer.write(connections[channel.topic], message.log_time, message.data)
-    path = next(folder.glob("*.mcap"))
-    assert_same_recording(read_recording(path, params.setup), blind[0], params)
-
-
-def assert_same_recording(recording: Recording, path: Path, params) -> None:
-    usual = read_recording(path, params.setup)
+def assert_same_recording(recording: Recording, usual: Recording) -> None:
     assert recording.losses == usual.losses == []
-    assert set(recording.streams) == set(usual.streams)
+    assert recording.streams.keys() == usual.streams.keys()
     for role, stream in usual.streams.items():
         np.testing.assert_array_equal(recording.streams[role].stamp, stream.stamp)
         assert recording.streams[role].topic == stream.topic
-        if isinstance(stream.values, np.ndarray):
+        if role not in ("color", "depth"):
             np.testing.assert_array_equal(recording.streams[role].values, stream.values)
+    assert recording.transforms.frames == usual.transforms.frames

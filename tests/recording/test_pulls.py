@@ -15,6 +15,7 @@ from pipeline.recording.input import reader
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.motion import Motion
 from pipeline.recording.pulls import Pull, pulls_of
+from tests.project import with_
 from tests.recording.conftest import written
 from tests.recording.joined import joined
 from validation.recordings.bag import START, Truth, blind_bag, edit
@@ -156,9 +157,8 @@ def test_one_recording_is_read_and_understood_once(seen, params, monkeypatch, de
     count(Motion, "of")
     for name in ("find_releases", "find_release", "find_grasp"):
         count(pulls, name)
-    delays = params.episode.delays.model_copy(update={"pose": delay, "camera": None})
-    episode = params.episode.model_copy(update={"delays": delays})
-    build_episodes(seen[0], "band1", params.model_copy(update={"episode": episode}))
+    given = with_(params, "episode.delays", pose=delay, camera=None)
+    build_episodes(seen[0], "band1", given)
     assert calls == {
         "read_container": 1,
         "geometry_of": 1,

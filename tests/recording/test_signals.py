@@ -13,6 +13,7 @@ from pipeline.base.errors import UserError
 from pipeline.recording.pulls import Pull
 from pipeline.recording.signals import ToolFacts, signals_of
 from pipeline.recording.tool_inertia import estimate_tool_inertia
+from tests.project import with_
 from tests.recording.played import GRAVITY, Played, stream
 from validation.recordings.bag import HAND, SENSOR, START, Truth
 
@@ -26,8 +27,7 @@ def tool(mass: float = MASS, center=TOOL) -> SimpleNamespace:
 
 def signals(played: Played, params, tool=None, recording=None, inertia=None):
     recording = recording or played.recording()
-    setup = params.setup.model_copy(update={"tool": tool})
-    params = params.model_copy(update={"setup": setup})
+    params = with_(params, "setup", tool=tool)
     return signals_of(Pull(recording, played.geometry()), params, inertia)
 
 

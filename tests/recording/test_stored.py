@@ -9,6 +9,7 @@ from pipeline.base.layout import Layout
 from pipeline.params import Params
 from pipeline.recording import stored
 from pipeline.recording.build import build_episodes
+from tests.project import content, with_
 
 
 @pytest.fixture
@@ -17,10 +18,6 @@ def layout(tmp_path: Path, seen, episode, params) -> Layout:
     layout = Layout(tmp_path)
     stored.keep(seen[0], [episode], params, layout)
     return layout
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
 def never(*_):
@@ -33,12 +30,7 @@ def test_what_is_kept_is_what_would_be_made(layout, seen, params, monkeypatch) -
     monkeypatch.setattr("pipeline.recording.build.build_episodes", never)
     (episode,), refused = stored.load_or_build(seen[0], "band1", params, layout)
     episode.save(layout.root / "found")
-    assert files(layout.root / "found") == files(layout.root / "made") and not refused
-
-
-def changed(params: Params, section: str, **values) -> Params:
-    section_changed = getattr(params, section).model_copy(update=values)
-    return params.model_copy(update={section: section_changed})
+    assert content(layout.root / "found") == content(layout.root / "made") and not refused
 
 
 def test_anything_changed_makes_it_again(layout, seen, params, monkeypatch) -> None:
@@ -51,8 +43,8 @@ def test_anything_changed_makes_it_again(layout, seen, params, monkeypatch) -> N
     other = shutil.copy(seen[0], layout.root / "other.mcap")
     assert requested(path=other) == "made"  # an episode says of which file it is
     assert requested(band="band2") == "made"
-    assert requested(params=changed(params, "force", cutoff=0.2)) == "made"
-    assert requested(params=changed(params, "cloud", mask="folder")) == "made"
+    assert requested(params=with_(params, "force", cutoff=0.2)) == "made"
+    assert requested(params=with_(params, "cloud", mask="folder")) == "made"
     stored.forget("band1", layout)
     assert requested() == "made"
     assert not (layout.root / ".checkpoints/band1-episodes").exists()

@@ -1,39 +1,21 @@
 """Files of a band edited by hand: read as ever, or one clear line names the file."""
 
-import json
 from pathlib import Path
 
-from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.identify.results.mounting import load_sling
 from pipeline.identify.results.theta import load_samples
 from pipeline.params import load
 from pipeline.simulator.parameters import Parameters
-from tests.edited import edits
+from tests.edited import outcomes
 from tests.project import DEFAULTS
 from tests.report.run.conftest import posterior
-
-
-def read_or_refused(path: Path, content: dict, read) -> tuple[int, int]:
-    """How many edits are read, and how many refused."""
-    counts = [0, 0]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    for what, edited in edits(content):
-        path.write_text(json.dumps(edited))
-        try:
-            read()
-            counts[0] += 1
-        except UserError as error:
-            line = str(error)
-            assert str(path) in line and line.isprintable() and len(line) < 500, what
-            counts[1] += 1
-    return tuple(counts)
 
 
 def test_the_calibration_of_clamps(tmp_path: Path) -> None:
     params, path = load(DEFAULTS), Layout(tmp_path).clamps("band1")
     content = {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}
-    read, refused = read_or_refused(path, content, lambda: load_sling(params, "band1", tmp_path))
+    read, refused = outcomes(path, content, lambda: load_sling(params, "band1", tmp_path))
     assert refused > 20 and read == 1  # with a key that nobody knows
 
 
@@ -41,5 +23,5 @@ def test_samples(tmp_path: Path) -> None:
     path = tmp_path / "data" / "confidence" / "toy" / "method.json"
     best = Parameters.of("rubber", [2e5, 0.45, 2e-3, 0.5, 0.5])
     content = posterior() | {"samples": posterior()["samples"][:2]}
-    read, refused = read_or_refused(path, content, lambda: load_samples(path, best))
+    read, refused = outcomes(path, content, lambda: load_samples(path, best))
     assert refused > 20 > read

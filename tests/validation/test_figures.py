@@ -1,7 +1,6 @@
 """Of which code a figure is: by its digests, by its commit, by DVC; and whether it meets."""
 
 import json
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -9,30 +8,17 @@ import pytest
 from app.flow.graph import outdated
 from pipeline.base.code import digest
 from pipeline.base.errors import UserError
-from tests.project import ROOT, python
+from tests.project import ROOT, commit_all, git, python, write_files
 from validation import figures
 from validation.figures import NOT_TOLD, OLDER, TODAY, UNKNOWN, as_json, listed, shown
-
-
-def git(folder: Path, *words: str) -> str:
-    who = ("-c", "user.name=A", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false")
-    done = subprocess.run(["git", *who, *words], cwd=folder, check=True, capture_output=True)
-    return done.stdout.decode().strip()
 
 
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
     """A small project under Git, with the sources of a simulator and of a benchmark."""
-    for file in (
-        "pipeline/simulator/solver.py",
-        "pipeline/simulator/deep/er.py",
-        "validation/bench.py",
-    ):
-        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / file).write_text("a = 1\n")
-    git(tmp_path, "init", "-q")
-    git(tmp_path, "add", "-A")
-    git(tmp_path, "commit", "-qm", "first")
+    sources = "pipeline/simulator/solver.py", "pipeline/simulator/deep/er.py", "validation/bench.py"
+    write_files(tmp_path, dict.fromkeys(sources, "a = 1\n"))
+    commit_all(tmp_path)
     return tmp_path
 
 
@@ -149,8 +135,7 @@ def test_a_users_mistake(project: Path) -> None:
 
 
 def test_the_command_lists_each_committed_file() -> None:
-    requested = ["git", "ls-files", "reports/*.json"]
-    names = subprocess.run(requested, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    names = git(ROOT, "ls-files", "reports/*.json")
     done = python("-m", "app", "figures", "--json", folder=ROOT)
     summary = {load["file"] for load in json.loads(done.stdout)["figures"]}
     assert {*names.split()} <= summary and len(summary) > 20

@@ -7,7 +7,7 @@ from pipeline.base.files import write_json
 from pipeline.params import load
 from pipeline.simulator.parameters import THETA
 from tests.policy import toy
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, with_
 from validation.campaigns import policy_as_printed as campaign
 from validation.campaigns.policy_as_printed import SWITCHES, Lesson, result, summary
 
@@ -21,9 +21,8 @@ def params(tmp_path, monkeypatch):
     monkeypatch.setattr(campaign, "simulator", lambda *args: toy.launch)
     content = {"band": "band1", "theta": dict(zip(THETA, POINT, strict=True))}
     write_json(tmp_path / "data/theta/band1/de.json", content)
-    params = load(DEFAULTS)
     small = {"envs": 16, "iterations": 2, "map_size": (9, 7), "hidden": (16,)}
-    return params.model_copy(update={"policy": params.policy.model_copy(update=small)})
+    return with_(load(DEFAULTS), "policy", **small)
 
 
 def test_each_switch_trains_another_policy_and_is_kept(params, tmp_path, monkeypatch) -> None:
@@ -36,16 +35,14 @@ def test_each_switch_trains_another_policy_and_is_kept(params, tmp_path, monkeyp
     monkeypatch.setattr(campaign, "train", None)  # a second training would fail
     again = [result(lesson, params, tmp_path, "de") for lesson in lessons]
     assert again == results
-    wider = params.model_copy(update={"setup": params.setup.model_copy(update={"max_force": 20.0})})
+    wider = with_(params, "setup", max_force=20.0)
     with pytest.raises(TypeError):
         result(lessons[0], wider, tmp_path, "de")
 
 
 def test_a_target_out_of_reach_is_no_landing(params, tmp_path) -> None:
-    weak = params.setup.model_copy(update={"max_force": 1e-3})
-    row = result(
-        Lesson("band1", "usual", 1), params.model_copy(update={"setup": weak}), tmp_path, "de"
-    )
+    weak = with_(params, "setup", max_force=1e-3)
+    row = result(Lesson("band1", "usual", 1), weak, tmp_path, "de")
     assert row["error_m"] == [None] * 3 and row["range_mean_error_m"] is None
     figures = summary([row])["band1"]["usual"]
     assert figures["miss_cm"]["mean"] is None and figures["range_failures"] == 256

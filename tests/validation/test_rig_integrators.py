@@ -10,13 +10,13 @@ from rig.physics.servo import ABSENT
 from rig.physics.string import GRAVITY
 from rig.physics.world import bent_at, string_of
 from rig.recorder.interaction import Interaction
+from tests.project import with_
 from validation.campaigns import rig_integrators as campaign
 
 
 @pytest.fixture(scope="module")
 def string(params):
-    rig = params.rig.model_copy(update={"edges": 16, "tolerance": 1e-4})
-    return string_of(params.model_copy(update={"rig": rig}), "band1")
+    return string_of(with_(params, "rig", edges=16, tolerance=1e-4), "band1")
 
 
 def test_the_band_of_the_jacobian_holds_all_of_it(string) -> None:

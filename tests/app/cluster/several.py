@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.project import until
+from tests.project import until, write_files
 from validation.projects import ProjectCopy
 
 STEP = """\
@@ -78,9 +78,7 @@ def toy(folder: Path) -> Copy:
         "params.yaml": "seed: 1\n",
         "recordings/a": "a recording\n",
     }
-    for name, text in files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text(text)
+    write_files(folder, files)
     copy = Copy(folder)
     copy.commit()
     return copy

@@ -228,10 +228,7 @@ def test_the_countdown_tells_each_stage_and_falls(capsys, monkeypatch) -> None:
     assert lines[0].startswith(f"[1/{len(chain)}] episode; about")
     assert seconds == sorted(seconds, reverse=True) and seconds[0] == sum(worth.values())
     assert seconds[-1] == 2 * worth["card"]  # by then the machine's pace is known
-    assert lines[-2:] == [
-        "      mine: 300 samples",
-        f"done in {clock[0]:.0f} s",
-    ]
+    assert lines[-2:] == ["      mine: 300 samples", f"done in {clock[0]:.0f} s"]
 
 
 def test_the_command(project, monkeypatch, capsys) -> None:

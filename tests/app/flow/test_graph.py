@@ -11,10 +11,7 @@ from tests.app.flow.toy import Toy, stage
 DIAMOND = {
     "late": stage("late", "word"),
     "top": stage("top", "word", meta={"gpu": True}),
-    "side": {
-        "matrix": {"item": ["left", "right"]},
-        **stage("side-${item.item}", "top.out"),
-    },
+    "side": {"matrix": {"item": ["left", "right"]}, **stage("side-${item.item}", "top.out")},
     "bottom": stage("bottom", "side-left.out", "side-right.out"),
 }
 

@@ -222,11 +222,7 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("section", "values", "expected"),
     [
-        (
-            "plan",
-            {"draw": (-0.6, 0.0)},
-            "y = -0.6 m lies 0.15 m beyond the -0.45 m of setup.draw",
-        ),
+        ("plan", {"draw": (-0.6, 0.0)}, "y = -0.6 m lies 0.15 m beyond the -0.45 m of setup.draw"),
         ("plan", {"draw": (-0.3, -0.4)}, "z = -0.4 m lies 0.1 m beyond the -0.3 m of setup.draw_z"),
         ("plan", {"draw": (-0.3, 0.5)}, "z = 0.5 m lies 0.5 m beyond the 0 m of setup.draw_z"),
         ("plan", {"draw": (-1e-300, 0.0)}, "draw by 0.251 m at least, not 0.000 m"),
@@ -248,8 +244,7 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
 )
 def test_what_is_refused_and_how_it_is_said(params, section, values, expected) -> None:
     if section == "bands":
-        values = {"band1": params.bands["band1"].model_copy(update={"diameter": 0.09})}
-        changed = params.model_copy(update={"bands": values})
+        changed = with_(params, "bands.band1", diameter=0.09)
     else:
         changed = with_(params, section, **values)
     with pytest.raises(UserError) as error:

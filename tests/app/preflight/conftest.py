@@ -1,6 +1,7 @@
 """The recordings of tests/recording, looked at once."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -10,6 +11,7 @@ from pipeline.params import Params
 from pipeline.params.lab import BandParams
 from pipeline.recording.build import Checked
 from pipeline.recording.pulls import Pull
+from tests.project import DEFAULTS
 from tests.recording.conftest import blind, masked, params, seen
 
 __all__ = ["blind", "masked", "params", "seen"]
@@ -32,6 +34,21 @@ def each_pull_is_processed_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("app.preflight.check.Checked", SimpleNamespace(of=processed_once))
         yield
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A project's folder whose window suits the small recordings."""
+    text = DEFAULTS.read_text()
+    for old, new in (
+        ("duration: 9.0", "duration: 3.6"),
+        ("samples: 300", "samples: 120"),
+        ("tail: 0.7", "tail: 0.5"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "params.yaml").write_text(text)
+    return tmp_path
 
 
 @pytest.fixture(scope="session")

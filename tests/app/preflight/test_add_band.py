@@ -8,26 +8,7 @@ import pytest
 from app.preflight.add_band import add_band
 from pipeline.base.errors import UserError
 from pipeline.params import load
-from tests.project import DEFAULTS
-
-
-@pytest.fixture
-def project(tmp_path: Path) -> Path:
-    """A project's folder whose window suits the small recordings."""
-    text = DEFAULTS.read_text()
-    for old, new in (
-        ("duration: 9.0", "duration: 3.6"),
-        ("samples: 300", "samples: 120"),
-        ("tail: 0.7", "tail: 0.5"),
-    ):
-        assert old in text
-        text = text.replace(old, new)
-    (tmp_path / "params.yaml").write_text(text)
-    return tmp_path
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+from tests.project import DEFAULTS, content
 
 
 def add(project: Path, recording: Path, name: str = "red", **changes) -> str:

@@ -45,10 +45,7 @@ def test_the_report_of_a_good_recording(looked, seen) -> None:
 
 def test_the_verdict_and_its_cautions_come_first(looked) -> None:
     cautions = [Finding("gap", "the force has a gap", "record it again")]
-    for problem, verdict in (
-        (None, "can be used, but:"),
-        ("no force", "cannot be used: no force"),
-    ):
+    for problem, verdict in ((None, "can be used, but:"), ("no force", "cannot be used: no force")):
         report = replace(looked.report, cautions=cautions, problem=problem)
         lines = report.to_text().splitlines()
         assert lines[2:4] == [verdict, "  - the force has a gap: record it again"]

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from pipeline.identify.objective.chamfer import LANES, SAMPLES, Chamfer
-from tests.identify.search.toy import LENGTH, RADIUS, facing, straight
+from tests.identify.search.toy import LENGTH, RADIUS, by_spreads, facing, straight
 
 CAMERA = np.array([1.0, -0.8, 0.6])
 
@@ -54,18 +54,7 @@ def test_equals_the_reference() -> None:
 def test_what_is_skipped_changes_no_bit(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Lines near and far, crumpled, of edges far too long, at a point, huge, and broken ones."""
     monkeypatch.setitem(LANES, "cpu", lanes)  # a vector as wide as a warp, too
-    rng = np.random.default_rng(2)
-    sizes = [1, 15, 17, 33, 500, 1000, 1025, 2500, 0, 40]
-    lines = np.tile(straight(len(sizes)), (12, 1, 1, 1)) + rng.normal(0, 0.003, (12, 1, 25, 3))
-    clouds = [
-        (lines[0, k][rng.integers(0, 25, size)] + rng.normal(0, 0.01, (size, 3))).astype(np.float32)
-        for k, size in enumerate(sizes)
-    ]
-    clouds[-1][:] = clouds[-1][0]
-    for line, spread in zip(lines[1:7], (0.003, 0.03, 0.3, 3.0, 1e4, 1e12), strict=True):
-        line += rng.normal(0, spread, (1, 25, 3))
-    lines[7] *= 1e-3
-    lines[8, :, ::2] = lines[8, :, 1::2].mean(axis=1, keepdims=True)
+    lines, clouds = by_spreads(12)
     lines[9], lines[10, :, 7], lines[11, :, 20] = np.nan, np.nan, np.inf
     for both in (True, False):
         distances, whole = (

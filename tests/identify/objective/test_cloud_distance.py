@@ -8,9 +8,16 @@ import warp as wp
 from scipy.spatial.distance import cdist
 
 from pipeline.identify.objective.chamfer import AROUND, LANES, RINGS, Chamfer, CloudDistance
-from pipeline.identify.objective.kernel import clouds_kernel
-from pipeline.identify.objective.loss import TERMS, EpisodeLoss
-from tests.identify.search.toy import CUTOFF, LENGTH, RADIUS, episode, facing, rollouts, straight
+from tests.identify.search.toy import (
+    LENGTH,
+    RADIUS,
+    by_spreads,
+    episode,
+    facing,
+    loss_of,
+    rollouts,
+    straight,
+)  # fmt: skip
 
 CAMERA = np.array([0.0, 0.0, 1e4])
 ASIDE = np.array([1.0, -0.8, 0.6])
@@ -71,18 +78,7 @@ def test_equals_all_pairs_of_scipy_and_open3d() -> None:
 def test_what_is_skipped_changes_no_bit(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Lines near and far, crumpled, at a point and huge; clouds of all sizes."""
     monkeypatch.setitem(LANES, "cpu", lanes)  # a vector as wide as a warp, too
-    rng = np.random.default_rng(2)
-    sizes = [1, 15, 17, 33, 500, 1000, 1025, 2500, 0, 40]
-    lines = np.tile(straight(len(sizes)), (9, 1, 1, 1)) + rng.normal(0, 0.003, (9, 1, 25, 3))
-    clouds = [
-        (lines[0, k][rng.integers(0, 25, size)] + rng.normal(0, 0.01, (size, 3))).astype(np.float32)
-        for k, size in enumerate(sizes)
-    ]
-    clouds[-1][:] = clouds[-1][0]
-    for line, spread in zip(lines[1:7], (0.003, 0.03, 0.3, 3.0, 1e4, 1e12), strict=True):
-        line += rng.normal(0, spread, (1, 25, 3))
-    lines[7] *= 1e-3
-    lines[8, :, ::2] = lines[8, :, 1::2].mean(axis=1, keepdims=True)
+    lines, clouds = by_spreads(9)
     distances, whole = (
         CloudDistance(clouds, ASIDE, culled=culled, **TUBE)(lines) for culled in (True, False)
     )
@@ -111,15 +107,6 @@ def test_a_stretched_band_is_thinner() -> None:
     assert pairs.min() == pytest.approx(nearest, abs=1e-6)
 
 
-def test_the_text_compiles_for_a_gpu(tmp_path) -> None:
-    """For Hopper, by the compiler that comes with Warp: no GPU is asked for."""
-    kernel, _ = clouds_kernel(24, RINGS, AROUND, LANES["cuda"])
-    wp.compile_aot_module(kernel.module, arch=90, module_dir=tmp_path, use_ptx=True)
-    (file,) = tmp_path.glob("*.ptx")
-    text = file.read_text()
-    assert ".target sm_90" in text and "shfl.sync" in text  # threads share a frame
-
-
 def test_empty_clouds_and_broken_rollouts_are_no_number_and_the_others_stay() -> None:
     lines = np.tile(straight(3), (3, 1, 1, 1))
     lines[1, 2, 7] = np.nan
@@ -132,12 +119,7 @@ def test_empty_clouds_and_broken_rollouts_are_no_number_and_the_others_stay() ->
 def test_a_loss_takes_it_wherever_the_rollouts_are() -> None:
     """Geometry alone changes; a copy of the rollouts as on a device costs the same."""
     recorded = episode()
-    seen, clouds = (
-        EpisodeLoss(
-            recorded, weights=dict.fromkeys(TERMS, 1.0), cutoff=CUTOFF, chamfer=kind, **TUBE
-        )
-        for kind in ("symmetric", "clouds")
-    )
+    seen, clouds = (loss_of(recorded, chamfer=kind) for kind in ("symmetric", "clouds"))
     simulated = rollouts(recorded, count=2, shift=(0, 0.003, 0), force=(0, 1, 0))
     there = type(simulated)(**vars(simulated))
     there.force = wp.array(simulated.force.astype(np.float32), device="cpu")
@@ -152,13 +134,7 @@ def test_a_loss_takes_it_wherever_the_rollouts_are() -> None:
 
 def test_a_perfect_place_costs_least() -> None:
     recorded = episode(frames=3)
-    loss = EpisodeLoss(
-        replace(recorded, clouds=[facing(500)] * 3),
-        weights=dict.fromkeys(TERMS, 1.0),
-        cutoff=CUTOFF,
-        chamfer="clouds",
-        **TUBE,
-    )
+    loss = loss_of(replace(recorded, clouds=[facing(500)] * 3), chamfer="clouds")
     shifts = (-0.01, -0.003, 0.0, 0.003, 0.01)
     geom = [loss.terms(rollouts(recorded, shift=(0, s, 0)))["geom"][0] for s in shifts]
     assert np.argmin(geom) == 2

@@ -4,6 +4,7 @@ Warp's arrays on the CPU stand for a GPU's: the text is one, threads that share 
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,17 +12,18 @@ import pytest
 from pipeline.base.machine import gpus
 from pipeline.base.native import start, wp
 from pipeline.identify.objective.box import SearchBox
+from pipeline.identify.objective.chamfer import AROUND, LANES, RINGS
 from pipeline.identify.objective.evaluate import Evaluator
-from pipeline.identify.objective.kernel import terms_kernel
+from pipeline.identify.objective.kernel import clouds_kernel, terms_kernel
 from pipeline.identify.objective.loss import TERMS, EpisodeLoss
 from pipeline.params import load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.parameters import Parameters
 from tests.identify.search import toy
+from tests.identify.search.toy import loss_of
 from tests.project import DEFAULTS
 from validation.synthetic import THETA, own_law_episode, recorded_yardstick
 
-WEIGHTS = dict.fromkeys(TERMS, 1.0)
 CROSSING = [-0.4, -0.3, -0.1, 0.02, *46 * [0.1]]  # y of the frames from the release on
 
 
@@ -47,11 +49,6 @@ def there(rollouts):
     moved.force = wp.array(wide, device="cpu")[:, 5:, :3]
     moved.center_line = wp.array(rollouts.center_line, device="cpu")
     return moved
-
-
-def loss_of(episode, **options) -> EpisodeLoss:
-    options = {"weights": WEIGHTS, "cutoff": toy.CUTOFF, **options}
-    return EpisodeLoss(episode, radius=toy.RADIUS, rest_length=toy.LENGTH, **options)
 
 
 @pytest.mark.parametrize(
@@ -105,13 +102,18 @@ def test_another_schedule_brings_its_own_filter() -> None:
             np.testing.assert_allclose(values, loss.terms(batch)[name], rtol=1e-9)
 
 
-def test_the_text_compiles_for_a_gpu(tmp_path) -> None:
+@pytest.mark.parametrize(
+    "kernel_of",
+    [partial(terms_kernel, 7), partial(clouds_kernel, 24, RINGS, AROUND, LANES["cuda"])],
+    ids=("terms", "clouds"),
+)
+def test_the_text_compiles_for_a_gpu(tmp_path, kernel_of) -> None:
     """For Hopper, by the compiler that comes with Warp: no GPU is asked for."""
-    kernel, _ = terms_kernel(7)
+    kernel, _ = kernel_of()
     wp.compile_aot_module(kernel.module, arch=90, module_dir=tmp_path, use_ptx=True)
     (file,) = tmp_path.glob("*.ptx")
     text = file.read_text()
-    assert ".target sm_90" in text and "shfl.sync" in text  # threads share a rollout
+    assert ".target sm_90" in text and "shfl.sync" in text  # threads share a rollout, or a frame
 
 
 @pytest.mark.skipif(not gpus(), reason="no CUDA device on this machine")
@@ -123,14 +125,9 @@ def test_terms_of_a_gpu_are_those_of_the_cpu(chamfer: str) -> None:
     episode = own_law_episode(sling, episode, Parameters.of(sling.law, THETA), cutoff=35.0)
     space = SearchBox.of(params.parameters)
     unit = np.random.default_rng(6).random((64, space.dimension))
-    loss = EpisodeLoss(
-        episode,
-        radius=sling.radius,
-        rest_length=sling.edge_lengths,
-        weights=WEIGHTS,
-        cutoff=35.0,
-        chamfer=chamfer,
-    )
+    sizes = {"radius": sling.radius, "rest_length": sling.edge_lengths}
+    weights = dict.fromkeys(TERMS, 1.0)
+    loss = EpisodeLoss(episode, weights=weights, cutoff=35.0, chamfer=chamfer, **sizes)
     rollouts = interact(sling, episode, space.parameters(space.to_physical(unit)), workers=4)
     assert rollouts.failure == [None] * 64
     moved = replace(

@@ -40,9 +40,7 @@ def simulate(sling, episode, parameters, device):
 
 
 def evaluator(workers: int = 1, **options) -> Evaluator:
-    weights = {"geom": 1.0, "force": 0.5, "work": 1.0}
-    sizes = {"radius": toy.RADIUS, "rest_length": toy.LENGTH}
-    loss = EpisodeLoss(EPISODE, weights=weights, cutoff=toy.CUTOFF, **sizes)
+    loss = toy.loss_of(EPISODE, weights={"geom": 1.0, "force": 0.5, "work": 1.0})
     options = {"workers": workers, "simulate": simulate, **options}
     return Evaluator(EPISODE, toy.SLING, loss, BOX, **options)
 

@@ -5,15 +5,8 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.episode.signal import average, lowpass
-from pipeline.identify.objective.loss import TERMS, EpisodeLoss
 from tests.identify.search import toy
-
-ONES = dict.fromkeys(TERMS, 1.0)
-
-
-def loss_of(episode, **changes) -> EpisodeLoss:
-    options = {"weights": ONES, "cutoff": toy.CUTOFF, **changes}
-    return EpisodeLoss(episode, radius=toy.RADIUS, rest_length=toy.LENGTH, **options)
+from tests.identify.search.toy import loss_of
 
 
 def test_a_perfect_simulation_costs_nothing_and_one_unit_reads_one() -> None:

@@ -13,7 +13,7 @@ from pipeline.identify.objective import session
 from pipeline.params import load
 from tests.identify.search import toy
 from tests.identify.search.functions import Evaluate, rosenbrock
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, with_
 
 PARAMS = load(DEFAULTS)
 UNIT = np.random.default_rng(1).random((4, 5))
@@ -50,8 +50,7 @@ def test_methods_and_stages_share_what_was_simulated(evaluators: list[Evaluate])
 def test_other_params_of_the_terms_start_over(evaluators: list[Evaluate]) -> None:
     """Another budget or another weight does not."""
     serve("sling2sim2real")
-    update = {"optimizer": PARAMS.optimizer.model_copy(update={"seed": 5, "k_top": 2})}
-    serve("no_work", PARAMS.model_copy(update=update))
+    serve("no_work", with_(PARAMS, "optimizer", seed=5, k_top=2))
     assert [evaluator.count for evaluator in evaluators] == [1, 0]
     for section, change in (
         ("setup", {"projectile_mass": 0.04}),
@@ -59,8 +58,7 @@ def test_other_params_of_the_terms_start_over(evaluators: list[Evaluate]) -> Non
         ("force", {"cutoff": 0.3}),
         ("loss", {"median_window": 5}),
     ):
-        other = getattr(PARAMS, section).model_copy(update=change)
-        serve("sling2sim2real", PARAMS.model_copy(update={section: other}))
+        serve("sling2sim2real", with_(PARAMS, section, **change))
     assert [evaluator.count for evaluator in evaluators] == [1, 0, 1, 1, 1, 1]
 
 

@@ -8,12 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from pipeline.identify.posterior.coordinates import (
-    MOST_DRAG,
-    MOST_LOST,
-    TAN_DELTA,
-    Coordinates,
-)
+from pipeline.identify.posterior.coordinates import MOST_DRAG, MOST_LOST, TAN_DELTA, Coordinates
 from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.simulator.parameters import EXTRA, Parameters
 from tests.identify.objective.pulls import PARAMS, sling_of

@@ -5,13 +5,7 @@ import pytest
 
 from pipeline.identify.posterior.gain import LandingModel, unknowns
 from pipeline.identify.posterior.launches import TAPE
-from tests.identify.posterior.toy_landings import (
-    COVARIANCE,
-    GRADIENT,
-    NAMES,
-    RNG,
-    landing_model,
-)
+from tests.identify.posterior.toy_landings import COVARIANCE, GRADIENT, NAMES, RNG, landing_model
 
 
 @pytest.fixture

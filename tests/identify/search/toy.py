@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from pipeline.episode.episode import Episode
+from pipeline.identify.objective.loss import TERMS, EpisodeLoss
 
 RADIUS, LENGTH, LAYERS = 0.005, 0.4, 25
 PERIOD = 0.03
@@ -29,6 +30,25 @@ def facing(points: int = 2000) -> np.ndarray:
     return cloud
 
 
+def by_spreads(count: int) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Lines (count, 10, 25, 3) near and far, huge, at a point, crumpled; clouds of all sizes."""
+    rng = np.random.default_rng(2)
+    sizes = [1, 15, 17, 33, 500, 1000, 1025, 2500, 0, 40]
+    lines = np.tile(straight(len(sizes)), (count, 1, 1, 1)) + rng.normal(
+        0, 0.003, (count, 1, 25, 3)
+    )
+    clouds = [
+        (lines[0, k][rng.integers(0, 25, size)] + rng.normal(0, 0.01, (size, 3))).astype(np.float32)
+        for k, size in enumerate(sizes)
+    ]
+    clouds[-1][:] = clouds[-1][0]
+    for line, spread in zip(lines[1:7], (0.003, 0.03, 0.3, 3.0, 1e4, 1e12), strict=True):
+        line += rng.normal(0, spread, (1, 25, 3))
+    lines[7] *= 1e-3
+    lines[8, :, ::2] = lines[8, :, 1::2].mean(axis=1, keepdims=True)
+    return lines, clouds
+
+
 def episode(samples: int = 60, frames: int = 20, **changes) -> Episode:
     """A hand that moves along y at 0.1 m/s and feels nothing, seen from far above."""
     time = PERIOD * (np.arange(samples) + 0.5)
@@ -46,6 +66,12 @@ def episode(samples: int = 60, frames: int = 20, **changes) -> Episode:
         "camera": np.array([0.0, 0.0, 1e4]),
     }
     return Episode(**{**content, **changes})
+
+
+def loss_of(of: Episode, **options) -> EpisodeLoss:
+    """The loss of the straight band; all terms weigh alike unless `options` say otherwise."""
+    options = {"weights": dict.fromkeys(TERMS, 1.0), "cutoff": CUTOFF, **options}
+    return EpisodeLoss(of, radius=RADIUS, rest_length=LENGTH, **options)
 
 
 def rollouts(of: Episode, count: int = 1, shift=(0, 0, 0), force=(0, 0, 0)) -> SimpleNamespace:

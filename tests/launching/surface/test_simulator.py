@@ -6,14 +6,12 @@ from pipeline.identify.results.theta import parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.params import load
 from pipeline.simulator.parameters import THETA
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, with_
 
 
 def test_the_simulator_launches_in_the_air_of_the_theta_file(tmp_path) -> None:
     """Drag takes speed; that of samples takes the place of the file's, launch by launch."""
-    params = load(DEFAULTS)
-    coarse = {"edges": 16, "launch_step": 1e-3}
-    params = params.model_copy(update={"sling": params.sling.model_copy(update=coarse)})
+    params = with_(load(DEFAULTS), "sling", edges=16, launch_step=1e-3)
     band, draw = next(iter(params.bands)), np.array([[-0.33, -0.15]])
     theta = dict(zip(THETA, (2.5e5, 0.47, 2e-3, 0.8, 0.6), strict=True))
     contents = [{"theta": theta, "nuisances": {"air_drag": drag}} for drag in (0.0, 6.0)]

@@ -83,10 +83,7 @@ def test_delays_that_the_recording_shows_are_said(checked) -> None:
 def test_times_of_receipt_tell_of_another_clock(checked) -> None:
     """A picture may come late, by a slow driver, and not before it was taken."""
     recording = checked.pull.recording
-    poses, seen = (
-        {0.3: True, -0.05: True, -0.01: False},
-        {0.045: True, -0.06: False, -0.2: True},
-    )
+    poses, seen = ({0.3: True, -0.05: True, -0.01: False}, {0.045: True, -0.06: False, -0.2: True})
     for role, cases in (("pose", poses), ("color", seen)):
         for offset, message in cases.items():
             stream = replace(

@@ -84,10 +84,7 @@ def test_a_hand_that_moves_before_the_pull_is_no_noise(checked, every) -> None:
 
 @pytest.mark.fires("units")
 def test_units(checked) -> None:
-    for newtons, name, refused in (
-        (1e-3, "millinewtons", True),
-        (9.81, "kilograms-force", False),
-    ):
+    for newtons, name, refused in ((1e-3, "millinewtons", True), (9.81, "kilograms-force", False)):
         message = findings_of(with_force(checked, lambda _, values, by=newtons: values / by))
         units = [finding for finding in message if finding.about == "units"]
         assert units and units[0].refused == refused and name in units[0].what

@@ -5,11 +5,11 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
 from mcap.reader import make_reader
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
+from rosbags.typesys import Stores, get_typestore
 
 from pipeline.base.errors import UserError
 from pipeline.recording.input.bag import missing_parts, name_of, once, parts_of, sha256
@@ -17,27 +17,13 @@ from pipeline.recording.input.container import read_container
 from pipeline.recording.input.contents import OVERHEAD
 from pipeline.recording.input.reader import read_recording
 from tests.recording.split import metadata, split
+from tests.recording.test_foxglove import assert_same_recording
 from validation.recordings.bag import blind_bag, write_bag
-
-
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory) -> Path:
-    return blind_bag(tmp_path_factory.mktemp("whole"))
 
 
 @pytest.fixture
 def parts(whole, tmp_path) -> list[Path]:
     return split(whole, tmp_path / "my", (1.0, 2.5))
-
-
-def same(first, other) -> None:
-    """Two recordings hold the same signals."""
-    assert first.streams.keys() == other.streams.keys()
-    for role, stream in first.streams.items():
-        np.testing.assert_array_equal(stream.stamp, other.streams[role].stamp)
-        if role not in ("color", "depth"):
-            np.testing.assert_array_equal(stream.values, other.streams[role].values)
-    assert first.transforms.frames == other.transforms.frames
 
 
 def test_a_split_bag_is_one_recording(whole, parts, params) -> None:
@@ -46,18 +32,23 @@ def test_a_split_bag_is_one_recording(whole, parts, params) -> None:
     folder = parts[0].parent
     assert read_recording(parts[0], params.setup).notes[0].startswith("all 3 parts of the bag were")
     for given in (folder, parts[0], parts[2]):
-        same(read_recording(given, params.setup), wanted)
+        assert_same_recording(read_recording(given, params.setup), wanted)
         assert (parts_of(given), name_of(given)) == (parts, "my")
     metadata(folder, *(part.name for part in parts[::-1]))
     recording = read_recording(folder, params.setup)
-    same(recording, wanted)
-    assert recording.losses == wanted.losses == [] and recording.path == folder
+    assert_same_recording(recording, wanted)
+    assert recording.path == folder
     assert len({sha256(path) for path in (folder, *parts)}) == 1
     assert once([*parts, whole]) == [parts[0], whole]
     assert once([parts[2], folder, whole, whole]) == [parts[2], whole, whole]
 
 
-def test_the_bag_that_a_library_of_others_writes(whole, tmp_path, params) -> None:
+RAW = "RIHS01_" + 64 * "0"
+HUMBLE = get_typestore(Stores.ROS2_HUMBLE)
+
+
+@pytest.mark.parametrize("own_types", [True, False])
+def test_the_bag_that_a_library_of_others_writes(own_types, whole, tmp_path, params) -> None:
     """rosbags names its file and writes the metadata; its one part is the recording."""
     with whole.open("rb") as stream:
         messages = list(make_reader(stream).iter_messages())
@@ -67,15 +58,12 @@ def test_the_bag_that_a_library_of_others_writes(whole, tmp_path, params) -> Non
         for schema, channel, message in messages:
             assert schema
             if channel.topic not in connections:
-                connections[channel.topic] = bag.add_connection(
-                    channel.topic,
-                    schema.name,
-                    msgdef=schema.data.decode(),
-                    rihs01="RIHS01_" + 64 * "0",
-                )
+                given = {"msgdef": schema.data.decode(), "rihs01": RAW}
+                types = {"typestore": HUMBLE} if own_types else given
+                connections[channel.topic] = bag.add_connection(channel.topic, schema.name, **types)
             bag.write(connections[channel.topic], message.log_time, message.data)
     assert [part.name for part in parts_of(folder)] == ["other.mcap"]
-    same(read_recording(folder, params.setup), read_recording(whole, params.setup))
+    assert_same_recording(read_recording(folder, params.setup), read_recording(whole, params.setup))
     assert sha256(folder) == sha256(folder / "other.mcap") and name_of(folder) == "other"
 
 

@@ -106,16 +106,18 @@ def test_a_picture_of_nothing_is_refused(decode) -> None:
         decode(packed("png", b""))
 
 
+# Of each file in a folder what is read or why it is refused.
 READ = """\
 import sys
 from pathlib import Path
 from pipeline.base.errors import UserError
 from pipeline.recording.input.container import read_container
-try:
-    found = read_container(Path(sys.argv[1]))
-    print(sum(len(one.payloads) for one in found.channels))
-except UserError as error:
-    print(error)
+for path in sorted(Path(sys.argv[1]).glob("*.mcap")):
+    try:
+        found = read_container(path)
+        print(path.stem, sum(len(c.payloads) for c in found.channels), *found.losses)
+    except UserError as error:
+        print(path.stem, "refused", error)
 held = open("/proc/self/status").read().split("VmHWM:")[1].split()[0]  # no memory of who began it
 print("peak", 1024 * int(held))
 """
@@ -136,6 +138,6 @@ def test_ten_million_tiny_messages_are_refused_in_one_line(tmp_path: Path) -> No
         record = head + struct.pack("<Q", len(small)) + small
         file.write(struct.pack("<BQ", 6, len(record)) + record)
     assert path.stat().st_size < 2**20
-    line, peak = run(READ, path)
+    line, peak = run(READ, tmp_path)
     assert "holds more than 1 GiB of messages" in line and str(path) in line
     assert int(peak.split()[1]) < MOST

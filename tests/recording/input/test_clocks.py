@@ -16,6 +16,7 @@ from pipeline.recording.delays import correct_delays
 from pipeline.recording.input import clocks
 from pipeline.recording.input.reader import Recording, read_recording
 from pipeline.recording.pulls import Pull
+from tests.project import with_
 from validation.recordings.bag import START, Truth, blind_bag, edit, head
 
 MS = 1_000_000
@@ -318,14 +319,11 @@ def test_a_given_delay_is_taken_off_first(tmp_path, params, good, late) -> None:
     summary = float(str(caught.value).partition("camera: ")[2].split()[0])
     assert summary == pytest.approx(late, abs=0.05)
     for camera in (late, summary):
-        delays = params.episode.delays.model_copy(update={"camera": camera})
-        recording = read_recording(path, params.setup, delays)
+        given = with_(params, "episode.delays", camera=camera)
+        recording = read_recording(path, params.setup, given.episode.delays)
         assert recording.late == {"color": camera, "depth": camera}
         off = recording.depth.stamp - good.depth.stamp
         np.testing.assert_allclose(off * 1e-9, late - camera, atol=1e-9)
-        given = params.model_copy(
-            update={"episode": params.episode.model_copy(update={"delays": delays})}
-        )
         right, output = correct_delays(Pull.of(recording, params.setup), given)
         assert output.camera.applied and output.camera.value == camera
         np.testing.assert_array_equal(

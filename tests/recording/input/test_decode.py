@@ -137,13 +137,7 @@ NESTED = b"p/A[5000] x\n" + b"=" * 80 + b"\nMSG: p/A\nuint8[5000] y\n"  # 25 mil
 @pytest.mark.parametrize(
     ("name", "encoding", "data", "messages", "words"),
     [
-        (
-            "lab/X",
-            "omgidl",
-            b"",
-            "cdr",
-            "schema 'omgidl' with messages 'cdr' cannot",
-        ),
+        ("lab/X", "omgidl", b"", "cdr", "schema 'omgidl' with messages 'cdr' cannot"),
         (NAME, "ros2msg", MSG.encode(), "json", "cannot be read"),
         ("lab.Wrench", "flatbuffer", b"", "flatbuffer", "ros2msg with cdr.*jsonschema with json"),
         ("", "", b"", "json", "no schema with messages 'json'"),

@@ -13,14 +13,8 @@ from pipeline.recording.input import opened
 from pipeline.recording.input.bag import name_of, parts_of
 from pipeline.recording.input.container import read_container
 from tests.recording.split import metadata, split
-from validation.recordings.bag import blind_bag
 
 PACKERS = {".zst": zstandard.compress, ".gz": gzip.compress, ".lz4": lz4.frame.compress}
-
-
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    return blind_bag(tmp_path_factory.mktemp("whole"))
 
 
 def counts(path) -> dict[str, int]:

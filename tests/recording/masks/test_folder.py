@@ -18,6 +18,7 @@ from pipeline.recording.input.reader import read_recording
 from pipeline.recording.masks import masker
 from pipeline.recording.pulls import Pull
 from pipeline.recording.view import View
+from tests.project import with_
 from tests.recording.joined import joined
 from validation.recordings import looks
 from validation.recordings.looks import LOOKS
@@ -25,8 +26,7 @@ from validation.recordings.looks import LOOKS
 
 @pytest.fixture(scope="module")
 def by_folder(params):
-    cloud = params.cloud.model_copy(update={"mask": "folder"})
-    return params.model_copy(update={"cloud": cloud})
+    return with_(params, "cloud", mask="folder")
 
 
 @pytest.fixture(scope="module")

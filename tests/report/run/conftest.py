@@ -111,10 +111,7 @@ def posterior() -> dict:
     """Samples within ± 10 % of θ."""
     spread = np.linspace(0.9, 1.1, 41)
     theta = np.array(list(THETA.values()))
-    return {
-        "names": list(NAMES),
-        "samples": (theta * spread[:, None]).tolist(),
-    }
+    return {"names": list(NAMES), "samples": (theta * spread[:, None]).tolist()}
 
 
 @pytest.fixture(scope="session")
@@ -152,6 +149,24 @@ def template(tmp_path_factory) -> Path:
     )
     launches().to_parquet(data / "trials" / BAND / f"{METHOD}.parquet")
     return root
+
+
+@pytest.fixture
+def no_simulation(monkeypatch) -> None:
+    from pipeline.report.run import report
+    from tests.report.run.toy_replay import toy_landscape, toy_replay
+
+    monkeypatch.setattr(report, "replay_method", toy_replay)
+    monkeypatch.setattr(report, "landscape", toy_landscape)
+
+
+@pytest.fixture
+def text_alone(monkeypatch) -> None:
+    """Pictures and the page take seconds, and tell a test of the text nothing."""
+    from pipeline.report.run import report, write
+
+    monkeypatch.setattr(report.Report, "picture", lambda _, name, *__: f"{name}.png")
+    monkeypatch.setattr(write, "write_page", lambda *_: None)
 
 
 @pytest.fixture

@@ -10,9 +10,7 @@ NOTHING = {kind: {"fitted": 0.2, "held_out": np.nan} for kind in ("force", "clou
 
 def toy_replay(params, band, method, episode, theta, residuals=NOTHING) -> MethodReplay:
     return MethodReplay(
-        force=0.9 * episode.force,
-        distance=np.full(len(episode.clouds), 0.01),
-        residuals=residuals,
+        force=0.9 * episode.force, distance=np.full(len(episode.clouds), 0.01), residuals=residuals
     )
 
 

@@ -4,15 +4,8 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.params import load
 from pipeline.report.run.results import load_floor
 from rig.oracle.floor import errors_of, trial_numbers
-from tests.project import DEFAULTS
-
-
-@pytest.fixture(scope="module")
-def params():
-    return load(DEFAULTS)
 
 
 def test_numbers_begin_with_the_trials_own(params) -> None:

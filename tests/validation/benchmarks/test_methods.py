@@ -9,7 +9,7 @@ from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.search.explore import rollouts_of
 from pipeline.params import load
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, with_
 from validation.benchmarks import methods as bench
 from validation.synthetic import THETA, recorded_yardstick
 
@@ -62,9 +62,8 @@ def test_a_search_is_timed_in_the_box_of_its_method() -> None:
 
 
 def test_the_large_budget_is_ten_times_the_laptops() -> None:
-    optimizer = PARAMS.optimizer.model_copy(update=bench.BUDGETS["large"])
-    params = PARAMS.model_copy(update={"optimizer": optimizer})
-    assert rollouts_of(params, "sling2sim2real") == 2560 and optimizer.cma_rollouts == 3200
+    params = with_(PARAMS, "optimizer", **bench.BUDGETS["large"])
+    assert rollouts_of(params, "sling2sim2real") == 2560 and params.optimizer.cma_rollouts == 3200
     assert rollouts_of(params, "bo") == 5760
 
 

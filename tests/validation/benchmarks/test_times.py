@@ -1,7 +1,6 @@
 """Times of steps: what is measured of a command, what is kept, and what stands in docs/times.md."""
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import pytest
 
 from app.cli import parser
 from pipeline.base.errors import UserError
-from tests.project import ROOT
+from tests.project import ROOT, commit_all, git, write_files
 from validation.benchmarks import times as bench
 from validation.benchmarks.times import BEGIN, END, MeasuredStep
 from validation.benchmarks.timing import disk, measured
@@ -45,12 +44,8 @@ def project(tmp_path: Path) -> Path:
         "stages/record.py": "import pipeline.simulator.solver\n",
         "app/cli.py": "",
     }
-    for name, text in files.items():
-        (root / name).parent.mkdir(parents=True, exist_ok=True)
-        (root / name).write_text(text)
-    who = ("-c", "user.name=A", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false")
-    for words in (("init", "-q"), ("add", "-A"), ("commit", "-qm", "first")):
-        subprocess.run(["git", *who, *words], cwd=root, check=True)
+    write_files(root, files)
+    commit_all(root)
     return root
 
 
@@ -136,8 +131,7 @@ def test_steps_are_measured_once_and_failures_again(project: Path, tmp_path: Pat
     assert (project / "docs/times.md").read_text().count(bench.table(written)) == 1
     assert written["steps"]["setup"]["disk_bytes"]["venv"] >= 10000
     assert set(written["code"]) == {"app/cli.py", "pipeline/simulator", "stages/record.py"}
-    head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=project, capture_output=True, text=True)
-    assert head.stdout.startswith(written["commit"])
+    assert git(project, "rev-parse", "HEAD").startswith(written["commit"])
 
 
 def test_a_page_without_marks_is_refused() -> None:

@@ -5,8 +5,6 @@ import difflib
 import numpy as np
 import pytest
 
-from pipeline.export import usd
-from sling2sim2real import Band, Model, Settings, Theta, export
 from validation.engines.physx.causes import VARIANTS, Variant, measured
 from validation.engines.physx.exported import job_of, read
 
@@ -14,13 +12,7 @@ PLACES = np.array([[0.0, -0.3, -0.15]])
 
 
 @pytest.fixture(scope="module")
-def stage(delivered, tmp_path_factory) -> Variant:
-    theta = Theta(2.2e5, 0.47, 2.4e-3, 0.7, 0.6)
-    band = Band(mass=0.023, diameter=0.010, rest_length=0.52, name="toy")
-    model = Model(band, theta, settings=Settings.coarse())
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(usd, "match_of", lambda target: None)
-        folder = export(model, "usd", tmp_path_factory.mktemp("stage") / "usd").folder
+def stage(folder) -> Variant:
     return Variant(*read(folder))
 
 

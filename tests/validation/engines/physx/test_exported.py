@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.export import usd
 from pipeline.export.replay import Shot
 from pipeline.simulator.cylinder import volumes
 from sling2sim2real import export
@@ -15,18 +14,6 @@ from validation.engines.physx.exported import Steps, held, job_of, launched, rea
 
 STRETCH, ACROSS = 1.6, 0.8
 DRAWS = np.array([[-0.30, -0.20], [-0.35, -0.15]])
-
-
-@pytest.fixture(scope="module")
-def folder(model, tmp_path_factory):
-    return export(model, "usd", tmp_path_factory.mktemp("stage") / "usd").folder
-
-
-@pytest.fixture(scope="module", autouse=True)
-def without_physx():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(usd, "match_of", lambda target: None)
-        yield
 
 
 class OneHalfStretched:
@@ -53,7 +40,7 @@ def test_the_stage_is_read_as_it_was_written(model, folder):
     assert tube.clamped[[1, -2]].mean(axis=1) == pytest.approx(model.sling.tips, abs=1e-8)
 
 
-def test_what_is_no_export_is_refused_in_a_line(model, tmp_path):
+def test_what_is_no_export_is_refused_in_a_line(model, without_physx, tmp_path):
     folder = export(model, "usd", tmp_path / "usd").folder
     stage = folder / "toy.usda"
     stage.write_text(stage.read_text().replace("restShapePoints", "shapePoints"))

@@ -1,5 +1,7 @@
 """A match in PhysX, by an engine whose bands are strings of its law."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
@@ -106,16 +108,11 @@ def test_an_export_is_matched_where_it_can_be(model, monkeypatch, tmp_path) -> N
     """Stage and card have what the match came to; the proof's draws took no part in it."""
     engines = []
 
-    class Process(StringEngine):
-        def __enter__(self):
-            engines.append(self)
-            return self
+    def begun() -> nullcontext:
+        engines.append(StringEngine(Tube.of(model.sling, usd.EDGES, usd.GRADING)))
+        return nullcontext(engines[-1])
 
-        def __exit__(self, *_) -> None:
-            pass
-
-    tube = Tube.of(model.sling, usd.EDGES, usd.GRADING)
-    monkeypatch.setattr(match, "Engine", lambda: Process(tube))
+    monkeypatch.setattr(match, "Engine", begun)
     monkeypatch.setattr(match, "release", lambda: "0.7")
     monkeypatch.setattr(match.wp, "is_cuda_available", lambda: True)
     monkeypatch.setattr(usd, "match_of", lambda target: match.matched)

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -35,15 +36,11 @@ def searched(tmp_path, monkeypatch):
 def test_launches_that_fail_leave_the_search_and_the_other_launches(searched, monkeypatch):
     written = []
 
-    class NoEngine:
-        def __enter__(self):
-            written.append(json.loads(searched.read_text()))
-            raise UserError("PhysX: it fell over")
+    def fails() -> None:
+        written.append(json.loads(searched.read_text()))
+        raise UserError("PhysX: it fell over")
 
-        def __exit__(self, *_):
-            pass
-
-    monkeypatch.setattr(search, "Engine", NoEngine)
+    monkeypatch.setattr(search, "Engine", fails)
     search.main()
     assert "launches" not in written[0] or written[0]["launches"]["failed_engines"] == {}
     content = json.loads(searched.read_text())
@@ -59,13 +56,6 @@ def test_launches_that_fail_leave_the_search_and_the_other_launches(searched, mo
 
 
 def test_what_physx_lands_stands_with_its_theta_and_draw(searched, monkeypatch):
-    class NoEngine:
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            pass
-
     def thrown(engine, sling, setup, thetas, draws, *, rate):
         assert setup.arm_stiffness is None
         done = search.launch(sling, setup, Parameters.of(sling.law, thetas), draws)
@@ -75,7 +65,7 @@ def test_what_physx_lands_stands_with_its_theta_and_draw(searched, monkeypatch):
             launches=SimpleNamespace(**fields), gained=np.full(len(where), np.nan)
         )
 
-    monkeypatch.setattr(search, "Engine", NoEngine)
+    monkeypatch.setattr(search, "Engine", nullcontext)
     monkeypatch.setattr(search, "launch_in_physx", thrown)
     search.main()
     content = json.loads(searched.read_text())["launches"]

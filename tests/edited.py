@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Callable, Iterator
 from copy import deepcopy
+from pathlib import Path
+
+import pytest
+
+from pipeline.base.errors import UserError
 
 GONE = object()
 JUNK = (GONE, None, float("nan"), -1e300, "<script>\x1b[2J\n", [], {}, True, [[1.0]], 10**400)
@@ -28,6 +34,24 @@ def edits(content: dict) -> Iterator[tuple[str, dict]]:
             shown = "gone" if junk is GONE else f"{junk!r:.20}"
             yield f"{'.'.join(map(str, path))}: {shown}", edited
     yield "no object", [content]
+
+
+def read_or_refused(path: Path, content: dict, read: Callable[[], object]) -> tuple[int, int]:
+    """How many edits of a file are read, and how many refused in one line that names it."""
+    counts = [0, 0]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    for what, edited in edits(content):
+        path.write_text(json.dumps(edited))
+        try:
+            read()
+            counts[0] += 1
+        except UserError as error:
+            line = str(error)
+            assert str(path) in line and line.isprintable() and len(line) < 500, what
+            counts[1] += 1
+        except Exception as error:
+            pytest.fail(f"{what}: {error!r}")
+    return tuple(counts)
 
 
 def _paths(value: object, above: tuple) -> Iterator[tuple]:

@@ -8,7 +8,6 @@ from pathlib import Path
 import psutil
 
 from pipeline.base.code import ROOT
-from pipeline.params import Params
 from pipeline.params.identification import steps_of
 from pipeline.params.lab import StepParams
 from validation.projects import DEFAULTS, environment, wait
@@ -38,12 +37,13 @@ def set_methods(content: dict, methods: list[str], ablations: list[str] | tuple 
                     place[key][step].append(name)
 
 
-def with_(params: Params, section: str, **values: object) -> Params:
-    """`params` with other values in a section, such as rig.camera."""
+def with_(params, section: str, **values: object):
+    """`params` with other values in a section, such as rig.camera or bands.band1; "": its own."""
+    if not section:
+        return params | values if isinstance(params, dict) else params.model_copy(update=values)
     first, _, rest = section.partition(".")
-    inner = getattr(params, first)
-    inner = with_(inner, rest, **values) if rest else inner.model_copy(update=values)
-    return params.model_copy(update={first: inner})
+    inner = params[first] if isinstance(params, dict) else getattr(params, first)
+    return with_(params, "", **{first: with_(inner, rest, **values)})
 
 
 def until(happens: Callable[[], object], seconds: float = 90.0):

@@ -1,33 +1,15 @@
 """Files of a band edited by hand: read as ever, or one clear line names the file."""
 
-import json
 from pathlib import Path
 
-from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.identify.results.mounting import load_sling
 from pipeline.identify.results.theta import load_samples
 from pipeline.params import load
 from pipeline.simulator.parameters import Parameters
-from tests.edited import edits
+from tests.edited import read_or_refused
 from tests.project import DEFAULTS
 from tests.report.run.conftest import posterior
-
-
-def read_or_refused(path: Path, content: dict, read) -> tuple[int, int]:
-    """How many edits are read, and how many refused."""
-    counts = [0, 0]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    for what, edited in edits(content):
-        path.write_text(json.dumps(edited))
-        try:
-            read()
-            counts[0] += 1
-        except UserError as error:
-            line = str(error)
-            assert str(path) in line and line.isprintable() and len(line) < 500, what
-            counts[1] += 1
-    return tuple(counts)
 
 
 def test_the_calibration_of_clamps(tmp_path: Path) -> None:

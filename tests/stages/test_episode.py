@@ -10,6 +10,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, NotMade
 from pipeline.identify.objective.session import load_episodes
 from stages import episode
+from tests.project import with_
 from tests.recording.conftest import blind, params, seen
 from tests.recording.joined import joined
 from tests.recording.split import split
@@ -72,8 +73,7 @@ def test_a_file_without_a_pull_that_can_be_used_leaves_the_episodes_alone(
 def test_a_band_without_a_recording_says_who_makes_one(folder, params, monkeypatch) -> None:
     with pytest.raises(NotMade, match="data/raw/band1/band1.mcap: missing"):
         episode.main()
-    changed = params.bands["band1"].model_copy(update={"source": "recording"})
-    changed = params.model_copy(update={"bands": {"band1": changed}})
+    changed = with_(params, "bands.band1", source="recording")
     monkeypatch.setattr(episode, "started", lambda *_: (changed, "band1"))
     with pytest.raises(UserError, match="sling add-recording --band band1 FILE.mcap` puts one"):
         episode.main()

@@ -18,6 +18,7 @@ from app.preflight.command import check
 from app.preflight.recordings import add_recording
 from pipeline.base.errors import UserError
 from tests.app.preflight.test_add_band import add, content, project
+from tests.project import with_
 from tests.recording.joined import joined
 from validation.recordings.bag import Truth, blind_bag
 
@@ -54,8 +55,7 @@ def masks(folder: Path) -> dict[str, bytes]:
 
 
 def test_check_uses_the_masks_beside_the_recording(masked, seen, params, tmp_path) -> None:
-    cloud = params.cloud.model_copy(update={"mask": "folder"})
-    chosen = params.model_copy(update={"cloud": cloud})
+    chosen = with_(params, "cloud", mask="folder")
     content = json.loads(check(masked, chosen, as_json=True, sheet=tmp_path / "a.png")[0])
     usual = json.loads(check(masked, params, as_json=True)[0])
     assert content["problem"] is None and (tmp_path / "a.png").is_file()
@@ -137,10 +137,8 @@ def test_pictures_are_those_to_mask_by_their_names(blind, seen, masked, params, 
             )
             np.testing.assert_array_equal(ours, theirs)
     assert count == 54
-    cloud = params.cloud.model_copy(update={"mask": "folder"})
-    text, status = check(
-        blind[0], params.model_copy(update={"cloud": cloud}), pictures=tmp_path / "b"
-    )
+    by_folder = with_(params, "cloud", mask="folder")
+    text, status = check(blind[0], by_folder, pictures=tmp_path / "b")
     assert status == 1 and "no such folder of masks" in text  # pictures come before masks
     assert "pictures to mask" in text and len(masks(tmp_path / "b")) == 54
 

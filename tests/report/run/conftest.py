@@ -13,10 +13,13 @@ from pipeline.episode.episode import Episode
 from pipeline.identify.search.regions import Region, save_regions
 from pipeline.launching.trials.measured import save_scores
 from pipeline.params import load
+from pipeline.report.run import report as reporting
+from pipeline.report.run import write as writing
 from pipeline.report.run.results import Result, Results, gather
 from pipeline.simulator.parameters import THETA as NAMES
 from tests.policy.stored import write_stored
 from tests.project import DEFAULTS, set_methods
+from tests.report.run.toy_replay import toy_landscape, toy_replay
 
 BAND, METHOD = "toy", "sling2sim2real"
 THETA = {
@@ -158,6 +161,19 @@ def template(tmp_path_factory) -> Path:
 def root(template: Path, tmp_path: Path) -> Path:
     """A copy of the template, to change."""
     return shutil.copytree(template, tmp_path, dirs_exist_ok=True)
+
+
+@pytest.fixture
+def no_simulation(monkeypatch) -> None:
+    monkeypatch.setattr(reporting, "replay_method", toy_replay)
+    monkeypatch.setattr(reporting, "landscape", toy_landscape)
+
+
+@pytest.fixture
+def text_alone(monkeypatch) -> None:
+    """Pictures and the page take seconds, and tell a test of the text nothing."""
+    monkeypatch.setattr(reporting.Report, "picture", lambda _, name, *__: f"{name}.png")
+    monkeypatch.setattr(writing, "write_page", lambda *_: None)
 
 
 @pytest.fixture

@@ -2,9 +2,7 @@
 
 import pytest
 
-from pipeline.report.run import report as reporting
 from pipeline.report.run import write as writing
-from tests.report.run.toy_replay import toy_landscape, toy_replay
 from tests.visit import DESKTOP, PHONE, overflow, visited
 
 FOREIGN = "new Image().src = 'http://example.invalid/picture.png'"
@@ -16,10 +14,8 @@ LOADED = """[...document.images].map(one => (one.loading = "eager", one.decode()
 
 
 @pytest.mark.parametrize("width", [DESKTOP, PHONE])
-def test_the_page_runs_alone(root, params, monkeypatch, width: int) -> None:
+def test_the_page_runs_alone(root, params, no_simulation, width: int) -> None:
     """On a phone, tables are wider than the window, and scroll within themselves."""
-    monkeypatch.setattr(reporting, "replay_method", toy_replay)
-    monkeypatch.setattr(reporting, "landscape", toy_landscape)
     writing.write(params, root)
     with visited(root / "reports" / "index.html", width) as seen:
         sizes = seen.page.evaluate(LOADED)

@@ -4,12 +4,9 @@ import json
 
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.report.run import report as reporting
 from pipeline.report.run import write as writing
-from tests.edited import edits
+from tests.edited import read_or_refused
 from tests.report.run.conftest import BAND, METHOD
-from tests.report.run.toy_replay import toy_landscape, toy_replay
 
 FILES = {
     "theta": f"data/theta/{BAND}/{METHOD}.json",
@@ -19,21 +16,8 @@ FILES = {
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_any_edit_is_one_line_or_a_report(name, template, root, params, monkeypatch) -> None:
-    monkeypatch.setattr(reporting, "replay_method", toy_replay)
-    monkeypatch.setattr(reporting, "landscape", toy_landscape)
-    monkeypatch.setattr(reporting.Report, "picture", lambda _, name, *__: f"{name}.png")
-    monkeypatch.setattr(writing, "write_page", lambda *_: None)
-    path, refused, accepted = root / FILES[name], 0, 0
-    for what, edited in edits(json.loads(path.read_text())):
-        path.write_text(json.dumps(edited))
-        try:
-            writing.write(params, root)
-            accepted += 1
-        except UserError as error:
-            line = str(error)
-            assert str(path) in line and line.isprintable() and len(line) < 500, what
-            refused += 1
-        except Exception as error:
-            pytest.fail(f"{what}: {error!r}")
+def test_any_edit_is_one_line_or_a_report(name, root, params, no_simulation, text_alone) -> None:
+    path = root / FILES[name]
+    content = json.loads(path.read_text())
+    accepted, refused = read_or_refused(path, content, lambda: writing.write(params, root))
     assert refused > accepted > 0

@@ -13,13 +13,12 @@ from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.launching.trials.measured import Measured, save_scores
 from pipeline.report.run.results import PRINTED, best_so_far, gather, has_another_loss, printed
+from tests.project import with_
 from tests.report.run.conftest import BAND, METHOD
 
 
 def test_further_methods_run_on_some_bands_only(root, params) -> None:
-    more = params.run.ablations.model_copy(update={"bands": (BAND,), "methods": ("de",)})
-    run = params.run.model_copy(update={"ablations": more})
-    plain, params = params, params.model_copy(update={"run": run})
+    plain, params = params, with_(params, "run.ablations", bands=(BAND,), methods=("de",))
     with pytest.raises(UserError, match=f"evaluations/{BAND}/de.parquet: missing"):
         gather(params, root)
     for file in (root / "data").glob(f"*/{BAND}/{METHOD}*"):
@@ -30,8 +29,7 @@ def test_further_methods_run_on_some_bands_only(root, params) -> None:
 
 
 def test_a_band_of_the_rig_has_a_floor(root, params) -> None:
-    run = params.run.model_copy(update={"rig": (BAND,)})
-    virtual = params.model_copy(update={"run": run})
+    virtual = with_(params, "run", rig=(BAND,))
     assert gather(params, root).floors == {}
     with pytest.raises(UserError, match=f"floor/{BAND}.json: missing"):
         gather(virtual, root)

@@ -11,25 +11,12 @@ import pandas as pd
 import pytest
 
 from pipeline.base.layout import NotMade
-from pipeline.report.run import report as reporting
 from pipeline.report.run import write as writing
+from tests.project import with_
 from tests.report.run.conftest import BAND, METHOD
-from tests.report.run.toy_replay import toy_landscape, toy_replay
 
+pytestmark = pytest.mark.usefixtures("no_simulation")
 THETA_FILE = f"data/theta/{BAND}/{METHOD}.json"
-
-
-@pytest.fixture(autouse=True)
-def no_simulation(monkeypatch) -> None:
-    monkeypatch.setattr(reporting, "replay_method", toy_replay)
-    monkeypatch.setattr(reporting, "landscape", toy_landscape)
-
-
-@pytest.fixture
-def text_alone(monkeypatch) -> None:
-    """Pictures and the page take seconds, and tell a test of the text nothing."""
-    monkeypatch.setattr(reporting.Report, "picture", lambda _, name, *__: f"{name}.png")
-    monkeypatch.setattr(writing, "write_page", lambda *_: None)
 
 
 def written(root, params) -> str:
@@ -57,7 +44,7 @@ def committed(root) -> dict:
 
 def rig(root, params, bands: tuple[str, ...]):
     """Parameters of a run in which the rig records and launches `bands`, all alike but by name."""
-    data, yaml = root / "data", {"source": "rig"}
+    data = root / "data"
     for band in bands:
         for file in data.glob(f"*/{BAND}"):
             shutil.copytree(file, file.with_name(band))
@@ -77,14 +64,10 @@ def rig(root, params, bands: tuple[str, ...]):
         floor = {"mean_error_m": 0.02, "launches": 5, "actuation_error_m": 1e-3}
         floor |= {"release_jitter": 0.02, "targets": {}}
         (data / "floor" / f"{band}.json").write_text(json.dumps(floor))
-    more = params.run.ablations.model_copy(
-        update={"bands": bands[:1], "methods": ("de", "no_work")}
-    )
-    run = params.run.model_copy(
-        update={"bands": bands, "rig": bands, "methods": METHODS[:4], "ablations": more}
-    )
-    band_params = params.bands[BAND].model_copy(update=yaml)
-    return params.model_copy(update={"run": run, "bands": dict.fromkeys(bands, band_params)})
+    params = with_(params, "run", bands=bands, rig=bands, methods=METHODS[:4])
+    params = with_(params, "run.ablations", bands=bands[:1], methods=("de", "no_work"))
+    of_rig = with_(params.bands[BAND], "", source="rig")
+    return with_(params, "", bands=dict.fromkeys(bands, of_rig))
 
 
 METHODS = (
@@ -177,9 +160,7 @@ def test_a_failed_prediction_is_named(root, params, text_alone) -> None:
 def test_held_out_data_have_a_table_where_params_hold_some_out(root, params, text_alone) -> None:
     """Though nothing is known of them: the toy's replay has none."""
     assert "held out" not in written(root, params)
-    held_out = params.loss.held_out.model_copy(update={"blocks": 2})
-    loss = params.loss.model_copy(update={"held_out": held_out})
-    text = written(root, params.model_copy(update={"loss": loss}))
+    text = written(root, with_(params, "loss.held_out", blocks=2))
     assert "| toy | Sling2Sim2Real | 0.200 | – | – |" in text
 
 
@@ -187,8 +168,7 @@ def test_says_of_a_policy_what_it_was_trained_on(root, params, text_alone) -> No
     maps, samples = "reads landings off maps", "512 × 4 samples each"
     text = written(root, params)
     assert maps in text and samples in text
-    policy = params.policy.model_copy(update={"landings": "simulated"})
-    text = written(root, params.model_copy(update={"policy": policy}))
+    text = written(root, with_(params, "policy", landings="simulated"))
     assert maps not in text and samples not in text
     assert "Training simulates every launch" in text and "512 × 4 simulated launches each" in text
 

@@ -17,6 +17,7 @@ from pipeline.report.run.tables.identified import (
 )
 from pipeline.report.run.tables.policies import policies
 from tests.hostile import MARKUP
+from tests.project import with_
 from tests.report.run.conftest import BAND, METHOD, episode
 from tests.report.run.tables.toy_results import launches, result
 from tests.report.run.tables.toy_results import results as all_of
@@ -47,8 +48,7 @@ def column(table, heading: str) -> list[str]:
 def test_what_a_method_holds_fixed(results, params, named) -> None:
     """In the notation of table 2, with the digits that a setting has."""
     fixed = {"poissons_ratio": 0.45, "elasticity_damping": 5e-3, "dynamic_friction": 0.125}
-    method = params.methods[METHOD].model_copy(update={"fixed": fixed})
-    params = params.model_copy(update={"methods": {METHOD: method}})
+    params = with_(params, f"methods.{METHOD}", fixed=fixed)
     assert column(methods(results, params, named), "held fixed") == [
         "ν 0.45, d 5.00 ms, friction 0.125"
     ]
@@ -106,8 +106,7 @@ def test_losses_say_what_each_term_weighs(results, params, named) -> None:
 
 
 def test_a_fit_that_minimises_no_sum_of_terms_has_no_shares(results, params, named) -> None:
-    method = params.methods[METHOD].model_copy(update={"search": "least_squares"})
-    params = params.model_copy(update={"methods": {METHOD: method}})
+    params = with_(params, f"methods.{METHOD}", search="least_squares")
     table = losses(results, params, named)
     assert column(table, "geom [cm]") == ["0.5"] and column(table, "total of its own loss") == ["–"]
 

@@ -2,15 +2,25 @@
 
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import psutil
+from ruamel.yaml import YAML
 
 from pipeline.base.code import ROOT
 from pipeline.params.identification import steps_of
 from pipeline.params.lab import StepParams
 from validation.projects import DEFAULTS, environment, wait
+
+# That a lab recorded, as params.yaml has one.
+BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    """All files below a folder, by their places in it."""
+    files = (file for file in folder.rglob("*") if file.is_file())
+    return {file.relative_to(folder): file.read_bytes() for file in files}
 
 
 def python(*arguments: str | Path, folder: Path = ROOT, **more: str) -> subprocess.CompletedProcess:
@@ -35,6 +45,25 @@ def set_methods(content: dict, methods: list[str], ablations: list[str] | tuple 
             for step in steps_of(searches[0][name].get("search", searches[1])):
                 if step in place[key]:
                     place[key][step].append(name)
+
+
+def write_params_of(
+    root: Path, band: str, method: str, mass: float, **sections: Mapping[str, object]
+) -> None:
+    """Write params.yaml of a run of one recorded band by one method; `sections` have other values.
+
+    Args:
+        mass: Of the band [kg].
+    """
+    yaml = YAML()
+    content = yaml.load(DEFAULTS)
+    content["run"].update(bands=[band], rig=[], dips=[])
+    content["run"]["ablations"].update(bands=[], rig=[])
+    set_methods(content, [method])
+    content["bands"][band] = BAND | {"mass": mass}
+    for name, values in sections.items():
+        content[name].update(values)
+    yaml.dump(content, root / "params.yaml")
 
 
 def with_(params, section: str, **values: object):

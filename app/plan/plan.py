@@ -29,7 +29,6 @@ from pipeline.params.lab import Dip, Gripper
 from pipeline.recording.geometry import FORK
 from pipeline.recording.input.frames import Transform
 
-RATES = (1.0, 10_000.0)  # Hz of the CSV
 if TYPE_CHECKING:
     from app.plan.design import DesignedPull
 
@@ -173,9 +172,6 @@ class Plan:
 
         Everything is made before the first file is written. Raises UserError.
         """
-        low, high = RATES
-        if not low <= rate <= high:
-            raise UserError(f"--rate: must be between {low:g} and {high:g} Hz, got {rate:g}")
         pose = self.trajectory, self.base, self.hand
         table = messages.csv_text(*pose, rate)
         waypoints = messages.trajectory_message(*pose, self.frame)

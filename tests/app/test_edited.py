@@ -13,7 +13,7 @@ from pipeline.export.export import replaceable
 from pipeline.params import load
 from tests.edited import edits, read_or_refused
 from tests.project import DEFAULTS
-from tests.report.card.conftest import POINT, THETA, confidence, samples
+from tests.report.card.conftest import POINT, samples, theta_file
 
 BAND, METHOD, DRAW = "band1", "least_squares", (-0.3, -0.15)
 
@@ -27,11 +27,8 @@ def params():
 def layout(tmp_path: Path) -> Layout:
     """A band that was identified."""
     layout = Layout(tmp_path)
-    theta = {"band": BAND, "method": METHOD, "law": "rubber", "theta": THETA}
-    theta |= {"history": {"pull_time": 1.4, "pause": 0.6}, "nuisances": {"air_drag": 0.3}}
-    theta |= {"turn_damping": 0.2, "returned_share": 1.0, "confidence": confidence()}
     for path, content in (
-        (layout.theta(BAND, METHOD), theta),
+        (layout.theta(BAND, METHOD), theta_file(BAND)),
         (layout.confidence(BAND, METHOD), {"names": [*POINT], "samples": samples()[:3].tolist()}),
         (layout.clamps(BAND), {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}),
     ):

@@ -6,10 +6,9 @@ import pytest
 
 from app.params_file import edited
 from app.preflight.add_band import _with_band
-from tests.project import python
+from tests.project import BAND, python
 from validation.projects import ProjectCopy, copy_project, run_of
 
-BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
 RUN = ("dvc", "exp", "run")
 STATUS = ("git", "status", "--porcelain", "-uall")
 

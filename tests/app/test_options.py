@@ -22,7 +22,7 @@ from app.preflight.check import Look
 from pipeline.base.layout import Layout
 from tests.app.fit.test_fit import CARD, LAUNCHES
 from tests.app.test_cli import aimable
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, contents
 
 BAND = {"source": "recording", "mass": 0.04, "diameter": 0.010, "rest_length": 0.52}
 ADD = "add-band mine --recording mine.mcap --mass 0.04"
@@ -146,17 +146,8 @@ def outcome(furnished, tmp_path_factory, monkeypatch, capsys):
             cli.main()
         message = [text.replace(str(place), "") for text in capsys.readouterr()]
         assert "Traceback" not in message[1]
-        files = {
-            file.relative_to(place): file.read_bytes()
-            for file in place.rglob("*")
-            if file.is_file()
-        }
-        return (
-            ended.value.code,
-            *message,
-            files,
-            [str(call).replace(str(place), "") for call in requested],
-        )
+        calls = [str(call).replace(str(place), "") for call in requested]
+        return ended.value.code, *message, contents(place), calls
 
     return run
 

@@ -5,9 +5,9 @@ import pytest
 from app.flow.graph import leading_to, stages_of
 from pipeline.params import load
 from stages.start import stage_of
+from tests.project import BAND
 from validation.projects import ProjectCopy, copy_project, run_of
 
-BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
 SEARCHES = {
     "least_squares": ("history", "density"),
     "sling2sim2real": ("history", "clusters", "cma"),

@@ -12,11 +12,10 @@ from app.preflight.add_band import _with_band
 from app.remove_band import remove_band
 from app.setup import LabMeasures, set_up
 from pipeline.params import load, parse
-from tests.project import DEFAULTS
+from tests.project import BAND, DEFAULTS
 from tools.preset import preset, write_preset
 
 TEXT = DEFAULTS.read_text("utf-8")
-BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
 SMALL = """\
 # of the file
 

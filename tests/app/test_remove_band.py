@@ -10,9 +10,8 @@ from app.preflight.add_band import _with_band
 from app.remove_band import remove_band
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
-from tests.project import DEFAULTS
+from tests.project import BAND, DEFAULTS, contents
 
-BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
 OTHERS = ("orange_2", "band1")
 
 
@@ -47,10 +46,6 @@ def put(root: Path, band: str) -> list[Path]:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(band)
     return files
-
-
-def content(root: Path) -> dict[Path, bytes]:
-    return {file: file.read_bytes() for file in root.rglob("*") if file.is_file()}
 
 
 def test_all_of_a_band_goes_and_nothing_else(project: Path) -> None:
@@ -88,11 +83,11 @@ def test_where_dvc_refuses_nothing_is_removed(project: Path, monkeypatch) -> Non
         raise UserError("DVC is busy")
 
     put(project, "orange")
-    before = content(project)
+    before = contents(project)
     monkeypatch.setattr(module, "drop", refuse)
     with pytest.raises(UserError, match="DVC is busy"):
         remove_band("orange", lambda lines: True, project)
-    assert content(project) == before
+    assert contents(project) == before
 
 
 @pytest.mark.parametrize(
@@ -106,10 +101,10 @@ def test_where_dvc_refuses_nothing_is_removed(project: Path, monkeypatch) -> Non
 def test_refused_it_removes_nothing(project: Path, name: str, answer: bool, message: str) -> None:
     put(project, "orange")
     put(project, "band1")
-    before = content(project)
+    before = contents(project)
     with pytest.raises(UserError, match=message):
         remove_band(name, lambda lines: answer, project)
-    assert content(project) == before
+    assert contents(project) == before
 
 
 def test_killed_it_goes_on(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:

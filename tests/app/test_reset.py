@@ -1,6 +1,5 @@
 """`sling reset`: values of params.yaml as the last commit has them."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -9,11 +8,11 @@ from app.params_file import edited
 from app.preflight.add_band import _with_band
 from app.reset import reset
 from pipeline.base.errors import UserError
-from tests.project import DEFAULTS
+from tests.project import BAND, DEFAULTS
 from tools.preset import preset, write_preset
+from validation.projects import ProjectCopy
 
 TEXT = DEFAULTS.read_text("utf-8")
-BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
 
 
 @pytest.fixture
@@ -21,9 +20,7 @@ def path(tmp_path: Path) -> Path:
     """A committed params.yaml."""
     path = tmp_path / "params.yaml"
     path.write_text(TEXT, "utf-8")
-    who = ("-c", "user.name=A", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false")
-    for words in (["init", "-q"], ["add", "-A"], [*who, "commit", "-qm", "first"]):
-        subprocess.run(["git", *words], cwd=tmp_path, check=True)
+    ProjectCopy(tmp_path).commit()
     return path
 
 

@@ -214,8 +214,6 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="cannot be written"):
         plan.write(tmp_path / "file", 100.0)
-    with pytest.raises(UserError, match="--rate: must be between 1 and 10000 Hz"):
-        plan.write(tmp_path / "new", 1e9)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 

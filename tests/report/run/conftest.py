@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from ruamel.yaml import YAML
 
 from pipeline.episode.episode import Episode
 from pipeline.identify.search.regions import Region, save_regions
@@ -18,7 +17,7 @@ from pipeline.report.run import write as writing
 from pipeline.report.run.results import Result, Results, gather
 from pipeline.simulator.parameters import THETA as NAMES
 from tests.policy.stored import write_stored
-from tests.project import DEFAULTS, set_methods
+from tests.project import DEFAULTS, write_params_of
 from tests.report.run.toy_replay import toy_landscape, toy_replay
 
 BAND, METHOD = "toy", "sling2sim2real"
@@ -123,14 +122,8 @@ def posterior() -> dict:
 @pytest.fixture(scope="session")
 def template(tmp_path_factory) -> Path:
     """A project folder with params.yaml and everything that the report reads."""
-    root, yaml = tmp_path_factory.mktemp("report"), YAML()
-    content = yaml.load(DEFAULTS)
-    content["run"].update(bands=[BAND], rig=[], dips=[])
-    content["run"]["ablations"].update(bands=[], rig=[])
-    set_methods(content, [METHOD])
-    band = {"source": "recording", "mass": 0.04, "diameter": 0.01, "rest_length": 0.52}
-    content["bands"][BAND] = band
-    yaml.dump(content, root / "params.yaml")
+    root = tmp_path_factory.mktemp("report")
+    write_params_of(root, BAND, METHOD, 0.04)
     data = root / "data"
     for name in ("evaluations", "clusters", "theta", "confidence", "trials", "launches"):
         (data / name / BAND).mkdir(parents=True)

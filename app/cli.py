@@ -353,7 +353,6 @@ def export(arguments: argparse.Namespace) -> Done:
 
 
 from app import project_commands  # noqa: E402, F401, I001 - they come last in the help
-from app import machine_commands  # noqa: E402, F401
 from app import developer  # noqa: E402, F401 - and these below them
 
 if __name__ == "__main__":

@@ -105,12 +105,14 @@ def undo(
 def _place_and_stage(
     params: Params, band: str, method: str, run: bool, root: Path | str
 ) -> tuple[Layout, str | None]:
-    """Where the band's files lie, and the stage that is to run. Raises UserError."""
+    """Where the band's files lie, and the stage of dvc.yaml that is to run. Raises UserError."""
     expect_known(params, "band", band, called="--band")
     expect_known(params, "method", method, called="--method")
     if params.methods[method].search != LEAST_SQUARES:
         raise UserError(f"--method {method}: takes no launches as evidence, least_squares does")
-    stage = policy_stage(params, band, method) if run else None
+    stage = stage_of(params, "policy", band, method) if run else None
+    if run and not stage:
+        raise UserError(f"{method} does not run on {band}: see `run:` in params.yaml, or --no-run")
     if run:
         expect_ready(Path(root))
     return Layout(Path(root)), stage
@@ -195,13 +197,6 @@ def prediction_of(
         None if samples is None else np.quantile(samples.column("returned_share"), ends).tolist()
     )
     return note
-
-
-def policy_stage(params: Params, band: str, method: str) -> str:
-    """Stage of dvc.yaml. Raises UserError where params.yaml runs the method on no such band."""
-    if stage := stage_of(params, "policy", band, method):
-        return stage
-    raise UserError(f"{method} does not run on {band}: see `run:` in params.yaml, or --no-run")
 
 
 def shown(answer: dict) -> str:

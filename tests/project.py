@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+from ruamel.yaml import YAML
 
 from pipeline.base.code import ROOT
 from pipeline.params.identification import steps_of
@@ -41,13 +42,36 @@ def set_methods(content: dict, methods: list[str], ablations: list[str] | tuple 
                     place[key][step].append(name)
 
 
+def write_params_of(
+    root: Path, band: str, method: str, mass: float, **sections: Mapping[str, object]
+) -> None:
+    """Write params.yaml of a run of one recorded band by one method; `sections` have other values.
+
+    Args:
+        mass: Of the band [kg].
+    """
+    yaml = YAML()
+    content = yaml.load(DEFAULTS)
+    content["run"].update(bands=[band], rig=[], dips=[])
+    content["run"]["ablations"].update(bands=[], rig=[])
+    set_methods(content, [method])
+    content["bands"][band] = BAND | {"mass": mass}
+    for name, values in sections.items():
+        content[name].update(values)
+    yaml.dump(content, root / "params.yaml")
+
+
 def with_(params: Any, section: str, **values: object) -> Any:
-    """`params` with other values in a section, such as rig.camera or bands.band1."""
+    """`params` with other values in a section, such as rig.camera or bands.band1; "": its own."""
+    if not section:
+        return (
+            {**params, **values}
+            if isinstance(params, Mapping)
+            else params.model_copy(update=values)
+        )
     first, _, rest = section.partition(".")
-    named = isinstance(params, Mapping)
-    inner = params[first] if named else getattr(params, first)
-    inner = with_(inner, rest, **values) if rest else inner.model_copy(update=values)
-    return {**params, first: inner} if named else params.model_copy(update={first: inner})
+    inner = params[first] if isinstance(params, Mapping) else getattr(params, first)
+    return with_(params, "", **{first: with_(inner, rest, **values)})
 
 
 def write_files(folder: Path, files: dict[str, str]) -> None:
@@ -57,9 +81,10 @@ def write_files(folder: Path, files: dict[str, str]) -> None:
         (folder / name).write_text(text)
 
 
-def content(folder: Path) -> dict[str, bytes]:
-    """All files below `folder`."""
-    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+def contents(folder: Path) -> dict[Path, bytes]:
+    """All files below `folder`, by their places in it."""
+    files = (file for file in folder.rglob("*") if file.is_file())
+    return {file.relative_to(folder): file.read_bytes() for file in files}
 
 
 def git(folder: Path, *words: str) -> str:

@@ -124,26 +124,25 @@ def brought_in(
     Raises:
         UserError: Nothing is changed.
     """
-    at = layout.root / "params.yaml"
     band_params = params.bands.get(name)
     if band_params is None:
         if band.mass is None:
             raise UserError(f"{name}: is new; weigh the band and give --mass KG, such as 0.0408")
-        return add_band(name, recordings, **band.given, params_path=at, root=layout.root)
+        return add_band(name, recordings, **band.given, root=layout.root)
     if band_params.source != "recording":
         raise UserError(f"{name}: is a band of the virtual rig; choose another name: --name NAME")
     there = digests(layout.recordings(name))
     given = digests(recordings)
     new = [file for digest, file in given.items() if digest not in there]
     if there and new and there.keys() <= given.keys():
-        done = add_recording(name, new, params_path=at, root=layout.root)
+        done = add_recording(name, new, root=layout.root)
         renew_masks(recordings, there)
         return done
     if not new and name in (*params.run.bands, *params.run.own):
         renew_masks(recordings, there)
         return f"{name} is there already, with {len(there)} recordings: goes on"
     values = {what: getattr(band_params, what) for what in ("mass", "diameter", "rest_length")}
-    return add_band(name, recordings, **values, params_path=at, root=layout.root)
+    return add_band(name, recordings, **values, root=layout.root)
 
 
 @contextmanager

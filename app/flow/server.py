@@ -128,7 +128,7 @@ def serve(root: Path, port: int | None = None) -> str:
 def expect_free(port: int) -> None:
     """Raises UserError, which says who has the port."""
     try:
-        _bound(port).close()
+        socket.create_server((HOST, port)).close()
     except OSError as error:
         other = _home_at(port)
         who = (
@@ -139,10 +139,6 @@ def expect_free(port: int) -> None:
         ) from error
     except OverflowError as error:
         raise UserError(f"--port: must be 1 to 65535, got {port}") from error
-
-
-def _bound(port: int) -> socket.socket:
-    return socket.create_server((HOST, port))
 
 
 def _log(root: Path) -> Path:

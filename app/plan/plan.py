@@ -29,7 +29,6 @@ from pipeline.params.lab import Dip, Gripper
 from pipeline.recording.geometry import FORK
 from pipeline.recording.input.frames import Transform
 
-RATES = (1.0, 10_000.0)  # Hz of the CSV
 if TYPE_CHECKING:
     from app.plan.design import DesignedPull
 
@@ -173,9 +172,6 @@ class Plan:
 
         Everything is made before the first file is written. Raises UserError.
         """
-        low, high = RATES
-        if not low <= rate <= high:
-            raise UserError(f"--rate: must be between {low:g} and {high:g} Hz, got {rate:g}")
         pose = self.trajectory, self.base, self.hand
         table = messages.csv_text(*pose, rate)
         waypoints = messages.trajectory_message(*pose, self.frame)
@@ -268,7 +264,8 @@ def plan_recording(
     drawn = np.array([0.0, *settings.draw])
     held = Held.of(band_params, setup)
     limits.check_draw(setup, held, drawn)
-    hand = _orientation(settings.orientation, base, drawn)
+    given = settings.orientation  # else it looks along the pull at the fork
+    hand = Rotation.from_quat(given) if given else base.rotation * along_pull(drawn)
     axis = (base.rotation.inv() * hand).apply([0.0, 0.0, 1.0])
     limits.check_hand(settings, band_params, axis, drawn)
     prediction = predict(params, band, drawn, theta, earlier)
@@ -346,11 +343,6 @@ def _standing(
         return Transform.identity(), None, FORK
     given = params.setup.base_to_fork is not None
     return fork, "setup.base_to_fork" if given else "the band's first episode", frame
-
-
-def _orientation(given: tuple[float, ...] | None, base: Transform, drawn: np.ndarray) -> Rotation:
-    """Orientation of the hand in the base: as given, else looking along the pull at the fork."""
-    return base.rotation * along_pull(drawn) if given is None else Rotation.from_quat(given)
 
 
 def _plain(vector: np.ndarray) -> list[float]:

@@ -11,6 +11,7 @@ from ruamel.yaml.comments import CommentedMap
 from app.flow.disk import expect_writable
 from app.params_file import edited
 from app.preflight import recordings as files
+from app.sizes import DIAMETER, REST_LENGTH
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
 from pipeline.base.layout import Layout
@@ -24,9 +25,8 @@ def add_band(
     name: str,
     recordings: Sequence[Path],
     mass: float,
-    diameter: float = 0.010,
-    rest_length: float = 0.52,
-    params_path: Path | str = "params.yaml",
+    diameter: float = DIAMETER,
+    rest_length: float = REST_LENGTH,
     root: Path | str = ".",
 ) -> str:
     """Check recordings, copy them to data/raw and add their band to params.yaml and to run.own.
@@ -40,7 +40,6 @@ def add_band(
         mass: Of the band [kg].
         diameter: Of its section [m].
         rest_length: Between the clamps [m].
-        params_path: The params.yaml to extend.
         root: Folder of the project.
 
     Returns:
@@ -51,23 +50,19 @@ def add_band(
     """
     if not NAME.fullmatch(name):
         raise UserError(f"band name {name!r}: use small letters, digits and _, a letter first")
-    params_path, layout = Path(params_path), Layout(Path(root))
+    path, layout = Path(root) / "params.yaml", Layout(Path(root))
     recordings = once(recordings)
-    before = load(params_path)
-    band = {
-        "source": "recording",
-        "mass": mass,
-        "diameter": diameter,
-        "rest_length": rest_length,
-    }
+    before = load(path)
+    sizes = {"mass": mass, "diameter": diameter, "rest_length": rest_length}
+    band = {"source": "recording", **sizes}
     there_before = name in before.bands
     if there_before and before.bands[name].model_dump(include={*band}) != band:
         raise UserError(
-            f"{params_path}: bands.{name} is there already with other values: choose another name,"
+            f"{path}: bands.{name} is there already with other values: choose another name,"
             f" or correct it (`sling fit --name {name} --mass ...`)"
         )
-    text = _with_band(params_path, name, band)
-    after = parse(text, str(params_path))
+    text = _with_band(path, name, band)
+    after = parse(text, str(path))
     new = files.targets(recordings, layout.raw(name))
     there = files.digests(layout.recordings(name))
     same = there and there.keys() == files.digests(recordings).keys()
@@ -80,13 +75,13 @@ def add_band(
         files.renew_masks(recordings, there)
         return f"{name} is there already: nothing to do"
 
-    expect_writable(params_path.parent, layout.raw(name))
+    expect_writable(layout.root, layout.raw(name))
     reports = files.checked(recordings, after, name, layout)
     if same:
         files.renew_masks(recordings, there)
     else:
         files.copy(new)
-    write_text(params_path, text)
+    write_text(path, text)
     return files.summary(f"{name} added", reports)
 
 

@@ -49,19 +49,6 @@ class Look:
     pulls: Sequence[Checked] = ()
 
 
-def check_recording(path: Path, params: Params, band: BandParams | None = None) -> CheckReport:
-    """Look at a recording as far as it can be read.
-
-    Args:
-        path: The MCAP file.
-        band: Of which diameter and rest_length count; a common one if None.
-
-    Raises:
-        UserError: where there is no MCAP file to look at. Anything else is in the report.
-    """
-    return look_at(path, params, band).report
-
-
 def look_at(
     path: Path,
     params: Params,
@@ -69,11 +56,16 @@ def look_at(
     source: str = "given",
     pull: int | None = None,
 ) -> Look:
-    """Do what `check_recording` does, and return the report with what it was made from.
+    """Look at a recording as far as it can be read: the report, and what it was made from.
 
     Args:
+        path: The MCAP file.
+        band: Of which diameter and rest_length count; a common one if None.
         source: Where `band` is from.
         pull: Which of several; None for the first that can be used, if there is one.
+
+    Raises:
+        UserError: where there is no MCAP file to look at. Anything else is in the report.
     """
     container = read_container(Path(path))
     band_params = band or COMMON

@@ -21,12 +21,7 @@ from pipeline.recording.input.bag import sha256
 from pipeline.recording.masks.folder import MASK_NAME, masks_beside
 
 
-def add_recording(
-    band: str,
-    recordings: Sequence[Path],
-    params_path: Path | str = "params.yaml",
-    root: Path | str = ".",
-) -> str:
+def add_recording(band: str, recordings: Sequence[Path], root: Path | str = ".") -> str:
     """Check further recordings of a band that is in params.yaml and copy them to data/raw/<band>.
 
     Returns:
@@ -36,9 +31,9 @@ def add_recording(
         UserError: in one line, where the band is not known or a recording cannot be used or is
             there already, by its name or its content. Nothing is copied then.
     """
-    params, recordings = load(params_path), bag.once(recordings)
-    expect_known(params, "band", band, called="--band")
     layout = Layout(Path(root))
+    params, recordings = load(layout.root / "params.yaml"), bag.once(recordings)
+    expect_known(params, "band", band, called="--band")
     there = digests(layout.recordings(band))
     files = targets(recordings, layout.raw(band))
     for file, target in files.items():

@@ -6,7 +6,6 @@ enough for any lab. Every violation is a UserError of one line that names the ke
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -76,7 +75,9 @@ class Params(Section):
             ("methods", self.run.methods, self.methods),
             ("ablations.methods", self.run.ablations.methods, self.methods),
         ):
-            _expect_all(names, defined, f"run.{key}")
+            for name in names:
+                if name not in defined:
+                    raise refusal(f"run.{key}: {name} is not one of {', '.join(defined)}")
         for band in self.run.ablations.bands:
             if band not in self.run.bands:
                 raise refusal(f"run.ablations.bands: {band} is not one of run.bands")
@@ -116,32 +117,16 @@ class Params(Section):
         return self
 
     @model_validator(mode="after")
-    def _methods_fit(self) -> Params:
+    def _sections_fit(self) -> Params:
         for name, method in self.methods.items():
             check_method(method, f"methods.{name}.", self.parameters, self.optimizer)
-        return self
-
-    @model_validator(mode="after")
-    def _the_foot_is_below_the_tips(self) -> Params:
         if self.setup.foot_height >= self.setup.fork_height:
             raise refusal("setup.foot_height: must be less than setup.fork_height")
-        return self
-
-    @model_validator(mode="after")
-    def _draws_are_above_the_floor(self) -> Params:
         if self.setup.draw_z[0] <= -self.setup.fork_height:
             raise refusal("setup.draw_z: must be above the floor, setup.fork_height below the tips")
-        return self
-
-    @model_validator(mode="after")
-    def _the_mesh_knows_the_law(self) -> Params:
         for name, method in self.methods.items():
             if method.law == "rubber" and self.sling.mesh != "rod":
                 raise refusal(f"methods.{name}.law: rubber is for sling.mesh: rod alone")
-        return self
-
-    @model_validator(mode="after")
-    def _bands_reach_across(self) -> Params:
         for name, band in self.bands.items():
             if band.rest_length <= self.setup.fork_width:
                 raise refusal(
@@ -177,12 +162,6 @@ class Params(Section):
                     f" {list(TARGET_AREA)}, where every landing counts as failed"
                 )
         return self
-
-
-def _expect_all(names: Iterable[str], defined: Collection[str], key: str) -> None:
-    for name in names:
-        if name not in defined:
-            raise refusal(f"{key}: {name} is not one of {', '.join(defined)}")
 
 
 def expect_known(params: Params, kind: str, name: str, called: str | None = None) -> None:

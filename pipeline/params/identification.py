@@ -152,16 +152,15 @@ class Weights(Section):
         return self
 
 
-def _is_search(text: str) -> str:
-    if text not in SEARCHES and not is_import(text):
-        raise refusal(f"must be {', '.join(SEARCHES)} or package.module:Class, got {text!r}")
-    return text
+def _one_of(ours: tuple[str, ...], kind: str) -> AfterValidator:
+    """One of ours, or a `kind` of the user's by its place."""
 
+    def check(text: str) -> str:
+        if text not in ours and not is_import(text):
+            raise refusal(f"must be {', '.join(ours)} or package.module:{kind}, got {text!r}")
+        return text
 
-def _is_engine(text: str) -> str:
-    if text not in ENGINES and not is_import(text):
-        raise refusal(f"must be {', '.join(ENGINES)} or package.module:function, got {text!r}")
-    return text
+    return AfterValidator(check)
 
 
 def _is_setting(value: object) -> object:
@@ -179,8 +178,8 @@ class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
     law: Law
-    search: Annotated[str, AfterValidator(_is_search)]
-    engine: Annotated[str, AfterValidator(_is_engine)]
+    search: Annotated[str, _one_of(SEARCHES, "Class")]
+    engine: Annotated[str, _one_of(ENGINES, "function")]
     settings: dict[str, Setting]
     fixed: dict[str, Value]
     bounds: dict[str, Bounds]
@@ -207,21 +206,17 @@ class MethodParams(MethodDefaults):
 
     @model_validator(mode="after")
     def _least_squares_fixes_the_unseen(self) -> MethodParams:
+        if self.search != LEAST_SQUARES:
+            return self
         more = {*self.fixed} - {*UNSEEN}
-        if self.search == LEAST_SQUARES and not (
-            more <= {*LAWS[self.law]} and {*UNSEEN} <= {*self.fixed}
-        ):
+        if not (more <= {*LAWS[self.law]} and {*UNSEEN} <= {*self.fixed}):
             raise refusal(
                 f"search: {LEAST_SQUARES} wants `fixed` to name {', '.join(UNSEEN)}, which no pull"
                 " shows, and besides them no more than what its law adds"
             )
-        if self.search == LEAST_SQUARES and self.settings:
+        if self.settings:
             raise refusal(f"settings: {LEAST_SQUARES} has none")
-        return self
-
-    @model_validator(mode="after")
-    def _least_squares_is_ours(self) -> MethodParams:
-        if self.search == LEAST_SQUARES and self.engine != OUR_ENGINE:
+        if self.engine != OUR_ENGINE:
             raise refusal(f"search: {LEAST_SQUARES} wants engine: {OUR_ENGINE}")
         return self
 

@@ -92,12 +92,10 @@ class RunParams(Section):
         for method in self.ablations.methods:
             if method in self.methods:
                 raise refusal(f"ablations.methods: {method} is one of run.methods already")
-        for band in self.own:
-            if band in self.bands:
-                raise refusal(f"own: {band} is one of run.bands already")
-        for band in self.dips:
-            if band in self.bands:
-                raise refusal(f"dips: {band} is one of run.bands already")
+        for key, bands in (("own", self.own), ("dips", self.dips)):
+            for band in bands:
+                if band in self.bands:
+                    raise refusal(f"{key}: {band} is one of run.bands already")
         return self
 
 

@@ -45,40 +45,33 @@ def settings_of(params: Params, band: str, method: str) -> dict[str, Any]:
     """
     settings = flat(f"bands.{band}", params.bands[band])
     for name in RECORDING:
-        settings.update(flat(name, getattr(params, name)))
-    settings.update(_part(params, "setup", *RECORDED_SETUP, *PULL_SETUP))
-    settings.update(_part(params, "sling", *MESH, *PULL_STEPS))
-    settings.update(flat("loss", params.loss))
-    settings.update(flat("parameters", params.parameters))
+        settings |= flat(name, getattr(params, name))
+    settings |= _part(params, "setup", *RECORDED_SETUP, *PULL_SETUP)
+    settings |= _part(params, "sling", *MESH, *PULL_STEPS)
+    settings |= flat("loss", params.loss) | flat("parameters", params.parameters)
     for name in METHOD:
-        settings.update(flat(f"methods.{method}.{name}", getattr(params.methods[method], name)))
+        settings |= flat(f"methods.{method}.{name}", getattr(params.methods[method], name))
     return settings
 
 
 def evidence_settings_of(params: Params) -> dict[str, Any]:
     """The settings that launches as evidence rest on, as `settings_of` gives them."""
-    settings = _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
-    return settings | {"trials.actuation_error": params.trials.actuation_error}
+    return _launch(params) | {"trials.actuation_error": params.trials.actuation_error}
 
 
 def policy_settings_of(params: Params, band: str) -> dict[str, Any]:
     """The settings that a policy rests on beside its θ, as `settings_of` gives them."""
     settings = flat(f"bands.{band}", params.bands[band])
-    settings.update(_launch_settings(params))
-    settings.update(_part(params, "setup", *PULL_SETUP, *POLICY_SETUP))
-    settings.update(_part(params, "sling", *MESH))
-    settings.update(flat("policy", params.policy))
-    return settings
+    settings |= _launch(params) | flat("launch", params.launch)
+    settings |= _part(params, "setup", *PULL_SETUP, *POLICY_SETUP)
+    return settings | _part(params, "sling", *MESH) | flat("policy", params.policy)
 
 
 def changes(then: Mapping[str, Any], now: Mapping[str, Any]) -> list[Change]:
     """What differs between two sets of settings, sorted by key."""
-    compared = (
-        Change(key, then.get(key, NOT_THERE), now.get(key, NOT_THERE)) for key in {*then, *now}
-    )
-    return sorted(
-        (change for change in compared if change.old != change.new), key=lambda change: change.key
-    )
+    keys = sorted({*then, *now})
+    compared = (Change(key, then.get(key, NOT_THERE), now.get(key, NOT_THERE)) for key in keys)
+    return [change for change in compared if change.old != change.new]
 
 
 def changed_since(params: Params, content: Mapping[str, Any], method: str) -> list[Change]:
@@ -92,9 +85,8 @@ def changed_since(params: Params, content: Mapping[str, Any], method: str) -> li
     return changes(then, now)
 
 
-def _launch_settings(params: Params) -> dict[str, Any]:
-    settings = _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
-    return settings | flat("launch", params.launch)
+def _launch(params: Params) -> dict[str, Any]:
+    return _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
 
 
 def _part(params: Params, section: str, *names: str) -> dict[str, Any]:

@@ -10,21 +10,25 @@ from app.launch import launch_output
 from app.observe import prediction_of
 from pipeline.base.layout import Layout
 from pipeline.export.export import replaceable
+from pipeline.params import load
 from tests.edited import edits, outcomes
-from tests.report.card.conftest import POINT, THETA, confidence, samples
+from tests.project import DEFAULTS
+from tests.report.card.conftest import POINT, samples, theta_file
 
 BAND, METHOD, DRAW = "band1", "least_squares", (-0.3, -0.15)
+
+
+@pytest.fixture(scope="module")
+def params():
+    return load(DEFAULTS)
 
 
 @pytest.fixture
 def layout(tmp_path: Path) -> Layout:
     """A band that was identified."""
     layout = Layout(tmp_path)
-    theta = {"band": BAND, "method": METHOD, "law": "rubber", "theta": THETA}
-    theta |= {"history": {"pull_time": 1.4, "pause": 0.6}, "nuisances": {"air_drag": 0.3}}
-    theta |= {"turn_damping": 0.2, "returned_share": 1.0, "confidence": confidence()}
     for path, content in (
-        (layout.theta(BAND, METHOD), theta),
+        (layout.theta(BAND, METHOD), theta_file(BAND)),
         (layout.confidence(BAND, METHOD), {"names": [*POINT], "samples": samples()[:3].tolist()}),
         (layout.clamps(BAND), {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}),
     ):
@@ -34,9 +38,12 @@ def layout(tmp_path: Path) -> Layout:
 
 
 def answers(path: Path, ask: Callable[[], dict]) -> int:
-    """How many edits of a file are answered in JSON; all others must be refused."""
-    output = lambda: json.dumps(ask() | {"warnings": []}, allow_nan=False)  # noqa: E731
-    return outcomes(path, json.loads(path.read_text()), output)[0]
+    """How many edits of a file are answered; all others must be refused."""
+
+    def answer() -> None:
+        json.dumps(ask() | {"warnings": []}, allow_nan=False)
+
+    return outcomes(path, json.loads(path.read_text()), answer)[0]
 
 
 @pytest.mark.parametrize("name", ["theta", "mounting"])

@@ -150,11 +150,10 @@ def test_a_draw_deeper_than_any_before_is_told_once(put, params, monkeypatch, ca
     assert "count as of the softened band" in first and "0.402 m was the most" in second
     assert capsys.readouterr().err == f"warning: {first}\nwarning: {second}\n"
 
-    preconditioned = with_(params, "bands.band1", preconditioned=True)
-    stays = preconditioned.methods["least_squares"].model_copy(update={"fixed": {"softening": 0.0}})
+    stays = with_(params, "methods.least_squares", fixed={"softening": 0.0})
     for whole, draw, words in (
-        (preconditioned, (-0.6, 0.0), None),
-        (with_method(params, stays), (-0.7, 0.0), "least_squares leaves that out"),
+        (with_(params, "bands.band1", preconditioned=True), (-0.6, 0.0), None),
+        (stays, (-0.7, 0.0), "least_squares leaves that out"),
     ):
         answer = observe.observe(
             whole, "band1", "least_squares", draw, 3.0, run=False, again=True, root=put.layout.root
@@ -162,10 +161,6 @@ def test_a_draw_deeper_than_any_before_is_told_once(put, params, monkeypatch, ca
         assert [words in warning["what"] for warning in answer["warnings"]] == (
             [True] if words else []
         )
-
-
-def with_method(params, method):
-    return params.model_copy(update={"methods": params.methods | {"least_squares": method}})
 
 
 def test_what_is_said_before_and_after() -> None:

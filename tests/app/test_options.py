@@ -22,120 +22,78 @@ from app.preflight.check import Look
 from pipeline.base.layout import Layout
 from tests.app.fit.test_fit import CARD, LAUNCHES
 from tests.app.test_cli import aimable
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, contents
 
 BAND = {"source": "recording", "mass": 0.04, "diameter": 0.010, "rest_length": 0.52}
 ADD = "add-band mine --recording mine.mcap --mass 0.04"
 AIM = "aim --band band1 --target 1.9"
-BENCH = "bench --methods de"
 DRAW = "--draw=-0.30,-0.17"
+EXPORT = "export --band mine --to mjcf"
 LAUNCH = f"launch --band band1 {DRAW}"
 OBSERVE = f"observe --band mine {DRAW} --landing 2.3 --no-run"
 PLAN = "plan --band band1"
-SETUP = "setup --max-force 25"
+MORE = "add-recording --band mine other.mcap"
 POSE = "0.7,0.0,1.4,1.0,0.0,0.0,0.0"
-# Of each option the command line without it, and with it; or with one value, and with another.
+# Of each option a command line with one value of it, and with another.
 CASES = {
     "fit recordings": ("fit --name mine", "fit other.mcap --name mine"),
-    "fit --mass": ("fit --name mine", "fit --name mine --mass 0.05"),
     "fit --name": ("fit --name mine", "fit --name band1"),
-    "fit --diameter": ("fit --name mine", "fit --name mine --diameter 0.011"),
-    "fit --rest-length": ("fit --name mine", "fit --name mine --rest-length 0.5"),
-    "fit --launches": ("fit --name mine", "fit --name mine --launches launches.csv"),
-    "fit --json": ("fit --name mine", "fit --name mine --json"),
     "add-band name": (ADD, ADD.replace("mine ", "yours ", 1)),
     "add-band --recording": (ADD, ADD.replace("mine.mcap", "other.mcap")),
     "add-band --mass": (ADD, ADD.replace("0.04", "0.05")),
-    "add-band --diameter": (ADD, f"{ADD} --diameter 0.011"),
-    "add-band --rest-length": (ADD, f"{ADD} --rest-length 0.5"),
-    "add-recording --band": (
-        "add-recording --band mine other.mcap",
-        "add-recording --band band9 other.mcap",
-    ),
-    "add-recording recordings": (
-        "add-recording --band mine other.mcap",
-        "add-recording --band mine mine.mcap",
-    ),
+    "add-recording --band": (MORE, MORE.replace("mine", "band9")),
+    "add-recording recordings": (MORE, MORE.replace("other", "mine")),
     "drift --band": ("drift --band mine", "drift --band band9"),
-    "drift --json": ("drift --band mine", "drift --band mine --json"),
     "check recording": ("check mine.mcap", "check other.mcap"),
-    "check --band": ("check mine.mcap", "check mine.mcap --band band2"),
-    "check --diameter": (
-        "check mine.mcap --band mine",
-        "check mine.mcap --band mine --diameter 0.02",
-    ),
-    "check --rest-length": ("check mine.mcap", "check mine.mcap --rest-length 0.5"),
-    "check --pull": ("check mine.mcap", "check mine.mcap --pull 2"),
-    "check --sheet": ("check mine.mcap", "check mine.mcap --sheet sheet.txt"),
-    "check --rrd": ("check mine.mcap", "check mine.mcap --rrd line.txt"),
-    "check --pictures": ("check mine.mcap", "check mine.mcap --pictures data"),
-    "check --frames": ("check mine.mcap", "check mine.mcap --frames"),
-    "check --json": ("check mine.mcap", "check mine.mcap --json"),
-    "setup --left-tip": (SETUP, f"{SETUP} --left-tip=0.7,0.1375,0.42"),
-    "setup --right-tip": (SETUP, f"{SETUP} --right-tip=0.7,-0.1375,0.42"),
-    "setup --fork-width": (SETUP, f"{SETUP} --fork-width 0.3"),
-    "setup --base-to-camera": (SETUP, f"{SETUP} --base-to-camera={POSE}"),
-    "setup --camera-to-fork": (SETUP, f"{SETUP} --camera-to-fork=0,0,0.9,1,0,0,0"),
-    "setup --floor": (SETUP, f"{SETUP} --floor=-0.1"),
-    "setup --max-force": (SETUP, "setup --max-force 26"),
-    "setup --draw-y": (SETUP, f"{SETUP} --draw-y=-0.4,-0.3"),
-    "setup --draw-z": (SETUP, f"{SETUP} --draw-z=-0.2,-0.1"),
-    "setup --json": (SETUP, f"{SETUP} --json"),
+    "setup --max-force": ("setup --max-force 25", "setup --max-force 26"),
     "plan --band": (PLAN, "plan --band band2"),
-    "plan --mass": (PLAN, f"{PLAN} --mass 0.05"),
-    "plan --diameter": (PLAN, f"{PLAN} --diameter 0.02"),
-    "plan --rest-length": (PLAN, f"{PLAN} --rest-length 0.5"),
-    "plan --draw": (PLAN, f"{PLAN} --draw=-0.30,-0.1"),
-    "plan --theta": (PLAN, f"{PLAN} --theta none.json"),
-    "plan --recording": (PLAN, f"{PLAN} --recording none.mcap"),
-    "plan --pull": (PLAN, f"{PLAN} --pull paper"),
-    "plan --precondition": (PLAN, f"{PLAN} --precondition 1"),
-    "plan --pulls": (PLAN, f"{PLAN} --pulls 2"),
-    "plan --out": (PLAN, f"{PLAN} --out there"),
-    "plan --rate": (PLAN, f"{PLAN} --rate 50"),
-    "plan --json": (PLAN, f"{PLAN} --json"),
     "launch --band": (LAUNCH, LAUNCH.replace("band1", "band2")),
     "launch --draw": (LAUNCH, LAUNCH.replace("0.30", "0.31")),
-    "launch --method": (LAUNCH, f"{LAUNCH} --method sling2sim2real"),
-    "launch --theta": (LAUNCH, f"{LAUNCH} --theta none.json"),
-    "launch --json": (LAUNCH, f"{LAUNCH} --json"),
     "aim --band": (AIM, AIM.replace("band1", "band2")),
-    "aim --method": (AIM, f"{AIM} --method sling2sim2real"),
     "aim --target": (AIM, AIM.replace("1.9", "2.0")),
-    "aim --force": (AIM, f"{AIM} --force"),
-    "aim --json": (AIM, f"{AIM} --json"),
     "observe --band": (OBSERVE, OBSERVE.replace("mine", "band2")),
     "observe --draw": (OBSERVE, OBSERVE.replace("0.30", "0.31")),
     "observe --landing": (OBSERVE, OBSERVE.replace("2.3", "2.4")),
-    "observe --draw-error": (OBSERVE, f"{OBSERVE} --draw-error 0.002"),
-    "observe --method": (OBSERVE, f"{OBSERVE} --method sling2sim2real"),
-    "observe --again": (OBSERVE.replace("2.3", "2.2"), OBSERVE.replace("2.3", "2.2") + " --again"),
-    "observe --undo": (OBSERVE, f"{OBSERVE} --undo"),
-    "observe --no-run": (OBSERVE.replace(" --no-run", ""), OBSERVE),
-    "observe --json": (OBSERVE, f"{OBSERVE} --json"),
-    "export --band": ("export --band mine --to mjcf", "export --band band2 --to mjcf"),
-    "export --method": ("export --band mine --to mjcf", "export --band mine --to mjcf --method de"),
-    "export --to": ("export --band mine --to mjcf", "export --band mine --to yaml"),
-    "export --out": ("export --band mine --to mjcf", "export --band mine --to mjcf --out there"),
-    "export --json": ("export --band mine --to mjcf", "export --band mine --to mjcf --json"),
+    "export --band": (EXPORT, EXPORT.replace("mine", "band2")),
+    "export --to": (EXPORT, EXPORT.replace("mjcf", "yaml")),
     "remove-band name": ("remove-band mine --yes", "remove-band band1 --yes"),
-    "remove-band --yes": ("remove-band mine", "remove-band mine --yes"),
     "reset keys": ("reset", "reset setup.tips"),
-    "flow --workers": ("flow", "flow --workers 2"),
-    "flow --gpus": ("flow", "flow --gpus 2"),
-    "flow --cluster": ("flow", "flow --cluster nowhere"),
-    "ui --port": ("ui", "ui --port 4300"),
-    "verify --device": ("verify", "verify --device cuda:0"),
-    "bench --device": (BENCH, f"{BENCH} --device cuda:0"),
-    "bench --scaling": (BENCH, f"{BENCH} --scaling mine"),
-    "bench --peers": (BENCH, f"{BENCH} --peers"),
-    "bench --recording": (BENCH, f"{BENCH} --recording mine.mcap"),
-    "bench --methods": (BENCH, "bench --methods bo"),
-    "bench --budget": (BENCH, f"{BENCH} --budget large"),
-    "bench --law": (BENCH, f"{BENCH} --law rubber"),
-    "bench --json": (BENCH, f"{BENCH} --json"),
-    "figures --json": ("figures", "figures --json"),
+    "bench --methods": ("bench --methods de", "bench --methods bo"),
     "--version": ("flow", "--version"),
+}
+# Command lines, and options that each is tried without and with.
+ADDED = {
+    "fit --name mine": "--mass 0.05, --diameter 0.011, --rest-length 0.5, --launches launches.csv,"
+    " --json",
+    ADD: "--diameter 0.011, --rest-length 0.5",
+    "drift --band mine": "--json",
+    "check mine.mcap": "--band band2, --rest-length 0.5, --pull 2, --sheet sheet.txt,"
+    " --rrd line.txt, --pictures data, --frames, --json",
+    "check mine.mcap --band mine": "--diameter 0.02",
+    "setup --max-force 25": "--left-tip=0.7,0.1375,0.42, --right-tip=0.7,-0.1375,0.42,"
+    f" --fork-width 0.3, --base-to-camera={POSE}, --camera-to-fork=0,0,0.9,1,0,0,0, --floor=-0.1,"
+    " --draw-y=-0.4,-0.3, --draw-z=-0.2,-0.1, --json",
+    PLAN: "--mass 0.05, --diameter 0.02, --rest-length 0.5, --draw=-0.30,-0.1, --theta none.json,"
+    " --recording none.mcap, --pull paper, --precondition 1, --pulls 2, --out there, --rate 50,"
+    " --json",
+    LAUNCH: "--method sling2sim2real, --theta none.json, --json",
+    AIM: "--method sling2sim2real, --force, --json",
+    OBSERVE: "--draw-error 0.002, --method sling2sim2real, --undo, --json",
+    OBSERVE.replace("2.3", "2.2"): "--again",
+    OBSERVE.removesuffix(" --no-run"): "--no-run",
+    EXPORT: "--method de, --out there, --json",
+    "remove-band mine": "--yes",
+    "flow": "--workers 2, --gpus 2, --cluster nowhere",
+    "ui": "--port 4300",
+    "verify": "--device cuda:0",
+    "bench --methods de": "--device cuda:0, --scaling mine, --peers, --recording mine.mcap,"
+    " --budget large, --law rubber, --json",
+    "figures": "--json",
+}
+CASES |= {
+    f"{line.split()[0]} {option.split()[0].partition('=')[0]}": (line, f"{line} {option}")
+    for line, options in ADDED.items()
+    for option in options.split(", ")
 }
 
 
@@ -188,17 +146,8 @@ def outcome(furnished, tmp_path_factory, monkeypatch, capsys):
             cli.main()
         message = [text.replace(str(place), "") for text in capsys.readouterr()]
         assert "Traceback" not in message[1]
-        files = {
-            file.relative_to(place): file.read_bytes()
-            for file in place.rglob("*")
-            if file.is_file()
-        }
-        return (
-            ended.value.code,
-            *message,
-            files,
-            [str(call).replace(str(place), "") for call in requested],
-        )
+        calls = [str(call).replace(str(place), "") for call in requested]
+        return ended.value.code, *message, contents(place), calls
 
     return run
 

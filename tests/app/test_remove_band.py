@@ -10,7 +10,7 @@ from app.preflight.add_band import _with_band
 from app.remove_band import remove_band
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
-from tests.project import BAND, DEFAULTS, content
+from tests.project import BAND, DEFAULTS, contents
 
 OTHERS = ("orange_2", "band1")
 
@@ -83,11 +83,11 @@ def test_where_dvc_refuses_nothing_is_removed(project: Path, monkeypatch) -> Non
         raise UserError("DVC is busy")
 
     put(project, "orange")
-    before = content(project)
+    before = contents(project)
     monkeypatch.setattr(module, "drop", refuse)
     with pytest.raises(UserError, match="DVC is busy"):
         remove_band("orange", lambda lines: True, project)
-    assert content(project) == before
+    assert contents(project) == before
 
 
 @pytest.mark.parametrize(
@@ -101,10 +101,10 @@ def test_where_dvc_refuses_nothing_is_removed(project: Path, monkeypatch) -> Non
 def test_refused_it_removes_nothing(project: Path, name: str, answer: bool, message: str) -> None:
     put(project, "orange")
     put(project, "band1")
-    before = content(project)
+    before = contents(project)
     with pytest.raises(UserError, match=message):
         remove_band(name, lambda lines: answer, project)
-    assert content(project) == before
+    assert contents(project) == before
 
 
 def test_killed_it_goes_on(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,8 +8,9 @@ from app.params_file import edited
 from app.preflight.add_band import _with_band
 from app.reset import reset
 from pipeline.base.errors import UserError
-from tests.project import BAND, DEFAULTS, commit_all
+from tests.project import BAND, DEFAULTS
 from tools.preset import preset, write_preset
+from validation.projects import ProjectCopy
 
 TEXT = DEFAULTS.read_text("utf-8")
 
@@ -19,7 +20,7 @@ def path(tmp_path: Path) -> Path:
     """A committed params.yaml."""
     path = tmp_path / "params.yaml"
     path.write_text(TEXT, "utf-8")
-    commit_all(tmp_path)
+    ProjectCopy(tmp_path).commit()
     return path
 
 

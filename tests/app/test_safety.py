@@ -12,7 +12,7 @@ from pipeline.episode.episode import Episode
 from pipeline.params import load
 from pipeline.params.provenance import evidence_settings_of, policy_settings_of, settings_of
 from pipeline.simulator.parameters import THETA
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, with_
 
 VALUES = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 CONTENT = {"band": "band1", "theta": VALUES, "confidence": {"settled": True, "steps": 7}}
@@ -197,7 +197,7 @@ def test_launches_as_evidence_are_settings_too(params, project) -> None:
 
 def test_a_method_that_runs_no_more_is_mended_by_naming_it(params, project) -> None:
     card(project, made_with=trained(params, **{"setup.max_force": 28.0}))
-    run = params.run.model_copy(update={"bands": [], "methods": []})
-    run = run.model_copy(update={"ablations": SimpleNamespace(bands=[], methods=[])})
-    (hazard,) = of_policy(params.model_copy(update={"run": run}), project)
+    ablations = SimpleNamespace(bands=[], methods=[])
+    alone = with_(params, "run", bands=[], methods=[], ablations=ablations)
+    (hazard,) = of_policy(alone, project)
     assert "`run:` in params.yaml has to name" in hazard.what

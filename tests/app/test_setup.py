@@ -21,7 +21,6 @@ LEFT, RIGHT = (0.70, 0.1375, 0.42), (0.70, -0.1375, 0.42)  # the target along th
 FORK = (0.7, 0, 0.42, 0, 0, -(0.5**0.5), 0.5**0.5)
 LOOKING_DOWN = (0.7, 0.0, 1.4, 1.0, 0.0, 0.0, 0.0)  # from 0.98 m above the fork
 ASIDE = (0.7, 0.0, 0.98, 0.0, 0.0, 0.0, 1.0)
-CLI = ("-m", "app.cli")
 
 
 @pytest.fixture
@@ -61,9 +60,7 @@ def test_everything_is_written_and_nothing_else_changes(path) -> None:
     done = set_up(measured, path)
     assert done["written"] and list(done["changed"])[0] == "max_force"
     setup = load(path).setup
-    assert setup.base_to_fork == pytest.approx(
-        (0.7, 0, 0.42, 0, 0, -(0.5**0.5), 0.5**0.5), abs=1e-5
-    )
+    assert setup.base_to_fork == pytest.approx(FORK, abs=1e-5)
     assert (setup.fork_height, setup.max_force, setup.draw_y) == (0.62, 25.0, (-0.44, -0.26))
     seen = np.eye(4)
     assert setup.camera_to_fork is not None
@@ -91,9 +88,7 @@ def test_two_of_three_poses_give_the_fork_in_the_base(path) -> None:
     seen = (0.0, 0.0, 0.98, 0.5**0.5, 0.5**0.5, 0.0, 0.0)
     set_up(LabMeasures(base_to_camera=LOOKING_DOWN, camera_to_fork=seen, floor=-0.1), path)
     setup = load(path).setup
-    assert setup.base_to_fork == pytest.approx(
-        (0.7, 0, 0.42, 0, 0, -(0.5**0.5), 0.5**0.5), abs=1e-5
-    )
+    assert setup.base_to_fork == pytest.approx(FORK, abs=1e-5)
     assert setup.fork_height == pytest.approx(0.52)
     touched = {"left_tip": LEFT, "right_tip": RIGHT, "base_to_camera": LOOKING_DOWN}
     done = set_up(LabMeasures(**touched, camera_to_fork=(0.005, *seen[1:])), path)

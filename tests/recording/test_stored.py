@@ -9,7 +9,7 @@ from pipeline.base.layout import Layout
 from pipeline.params import Params
 from pipeline.recording import stored
 from pipeline.recording.build import build_episodes
-from tests.project import content, with_
+from tests.project import contents, with_
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def test_what_is_kept_is_what_would_be_made(layout, seen, params, monkeypatch) -
     monkeypatch.setattr("pipeline.recording.build.build_episodes", never)
     (episode,), refused = stored.load_or_build(seen[0], "band1", params, layout)
     episode.save(layout.root / "found")
-    assert content(layout.root / "found") == content(layout.root / "made") and not refused
+    assert contents(layout.root / "found") == contents(layout.root / "made") and not refused
 
 
 def test_anything_changed_makes_it_again(layout, seen, params, monkeypatch) -> None:

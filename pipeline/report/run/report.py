@@ -68,8 +68,9 @@ class Report:
 
     @property
     def references(self) -> tuple[str, ...]:
-        """The main method, and the paper's where that ran beside it."""
-        return references(self.params)
+        """What others are compared with: the main method, and the paper's where it ran too."""
+        theirs = (METHOD,) if METHOD in self.params.run.methods else ()
+        return tuple(dict.fromkeys((self.main, *theirs)))
 
     def shown(self, methods) -> Styles:
         """The styles of methods, in the order of the run."""
@@ -85,12 +86,6 @@ class Report:
     def draws(self, result: Result, targets: np.ndarray) -> np.ndarray:
         """The policy's draws (N, 2) [m] for targets (N,) [m]."""
         return Stored(result.band, result.method, self.root).draws(targets)
-
-
-def references(params: Params) -> tuple[str, ...]:
-    """What others are compared with: the first method of the run, and the paper's if it runs."""
-    methods = params.run.methods
-    return tuple(dict.fromkeys([methods[0], *(m for m in methods if m == METHOD)]))
 
 
 def _replays(params: Params, results: Results, band: str) -> dict[str, MethodReplay]:

@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from pipeline.base.files import write_json, write_text
 from pipeline.params import Params
+from pipeline.report.drawing.page import page
 from pipeline.report.run.chapters.appendix import appendix
 from pipeline.report.run.chapters.evaluation import evaluation
 from pipeline.report.run.chapters.outcome import outcome
 from pipeline.report.run.chapters.paper_tables import paper_tables
 from pipeline.report.run.metrics import summary
-from pipeline.report.run.page import write_page
 from pipeline.report.run.paper import METHOD
 from pipeline.report.run.report import Report
 from pipeline.report.run.run import write_run
 
 # The chapters of each page: each makes its text of a Report, and writes what the text shows.
 PAGES = {"README": (outcome, paper_tables, evaluation), "appendix": (appendix,)}
+HTML = {"README": "index", "appendix": "appendix"}  # names of pages
+LINK = re.compile(rf"\]\(((?:bands/[^)/]+/)?)({'|'.join(HTML)})\.md\)")
+RUN = """\
+<p id="run"></p>
+<script src="run.js"></script>
+<script>
+if (window.run) {
+  const about = Object.entries(run).map(([name, value]) => `${name}: ${value}`);
+  document.getElementById("run").textContent = "This run. " + about.join(" · ");
+}
+</script>"""
 
 
 def write(params: Params, root: str | Path = ".") -> None:
@@ -30,3 +42,14 @@ def write(params: Params, root: str | Path = ".") -> None:
         write_text(report.folder / f"{name}.md", markdown)
         write_page(report.folder, name, markdown)
     write_run(report.folder)
+
+
+def write_page(folder: Path, name: str, markdown: str) -> None:
+    """Write <name>.md as HTML into `folder`, where its pictures lie: a file that needs no network.
+
+    Only run.js lies beside it, which says where and when it was written and may be missing. Links
+    to texts become links to their pages. Raises UserError.
+    """
+    text = LINK.sub(lambda link: f"]({link[1]}{HTML[link[2]]}.html)", markdown)
+    title = "Sling2Sim2Real: " + ("report" if name == "README" else name)
+    write_text(folder / f"{HTML[name]}.html", page(text, folder, title, foot=RUN))

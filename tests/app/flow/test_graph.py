@@ -7,6 +7,7 @@ import pytest
 from app.flow.graph import Graph, Stage, leading_to
 from pipeline.base.errors import UserError
 from tests.app.flow.toy import Toy, stage
+from tests.project import contents
 
 DIAMOND = {
     "late": stage("late", "word"),
@@ -86,13 +87,9 @@ def test_parameters_are_read_when_asked(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_asking_leaves_nothing_behind(toy: Toy) -> None:
-
     def state() -> dict[Path, bytes]:
-        return {
-            file: file.read_bytes()
-            for file in toy.folder.rglob("*")
-            if file.is_file() and file.name not in ("lock", "btime")
-        }
+        files = contents(toy.folder).items()
+        return {file: text for file, text in files if file.name not in ("lock", "btime")}
 
     before = state()
     graph = Graph(toy.folder)

@@ -97,15 +97,19 @@ def test_a_port_that_another_program_has_is_refused(tmp_path: Path, monkeypatch)
         server.serve(tmp_path, 70000)
 
 
+def replace_prefect(code: str, folder: Path, patch: pytest.MonkeyPatch) -> None:
+    """Have `python -m prefect` run another one."""
+    (folder / "prefect").mkdir()
+    (folder / "prefect/__init__.py").touch()
+    (folder / "prefect/__main__.py").write_text(code)
+    patch.setenv("PYTHONPATH", str(folder))
+
+
 def test_a_deaf_server_whose_guard_was_killed_ends_all_the_same(tmp_path, monkeypatch) -> None:
     """As one is that has just begun to start."""
     deaf = "import pathlib, signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN)"
-    (tmp_path / "prefect").mkdir()
-    (tmp_path / "prefect/__init__.py").touch()
-    (tmp_path / "prefect/__main__.py").write_text(
-        f"{deaf}; pathlib.Path(__file__).with_name('ready').touch(); time.sleep(60)"
-    )
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    deaf += "; pathlib.Path(__file__).with_name('ready').touch(); time.sleep(60)"
+    replace_prefect(deaf, tmp_path, monkeypatch)
     monkeypatch.setattr(server, "_home_at", lambda port: server.home(tmp_path))
     monkeypatch.setattr(server.guard, "GRACE", 0.5)
     with server._server(tmp_path, 1) as guard:
@@ -117,10 +121,7 @@ def test_a_deaf_server_whose_guard_was_killed_ends_all_the_same(tmp_path, monkey
 
 
 def test_a_server_that_a_full_disk_keeps_from_starting_is_said_so(tmp_path, monkeypatch) -> None:
-    (tmp_path / "prefect").mkdir()
-    (tmp_path / "prefect/__init__.py").touch()
-    (tmp_path / "prefect/__main__.py").write_text("raise SystemExit(1)")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    replace_prefect("raise SystemExit(1)", tmp_path, monkeypatch)
     usage = shutil.disk_usage(tmp_path)
     for free, message in ((10_000, "No space left on device"), (10**8, "server.log says why")):
         disk = usage._replace(free=free)

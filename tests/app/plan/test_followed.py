@@ -73,13 +73,13 @@ def recorded(tmp_path_factory):
 
 
 def test_a_robot_that_follows_the_plan_makes_a_recording_that_check_accepts(recorded) -> None:
-    from app.preflight.check import check_recording
+    from app.preflight.check import look_at
 
     path, plan, params, truth = recorded
     np.testing.assert_allclose(
         Rotation.from_quat(plan.hand).as_matrix(), (BASE[0].inv() * HAND).as_matrix(), atol=1e-9
     )
-    report = check_recording(path, params)
+    report = look_at(path, params).report
     assert report.usable, report.problem
     assert report.signals.release_s == pytest.approx(truth.release, abs=1e-3)
     assert report.signals.draw_m == pytest.approx([0, -0.4, 0], abs=1e-3)

@@ -214,22 +214,28 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="cannot be written"):
         plan.write(tmp_path / "file", 100.0)
-    with pytest.raises(UserError, match="--rate: must be between 1 and 10000 Hz"):
-        plan.write(tmp_path / "new", 1e9)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 @pytest.mark.parametrize(
     ("section", "values", "expected"),
     [
-        ("plan", {"draw": (-0.6, 0.0)}, "y = -0.6 m lies 0.15 m beyond the -0.45 m of setup.draw"),
+        (
+            "plan",
+            {"draw": (-0.6, 0.0)},
+            "y = -0.6 m lies 0.15 m beyond the -0.45 m of setup.draw",
+        ),
         ("plan", {"draw": (-0.3, -0.4)}, "z = -0.4 m lies 0.1 m beyond the -0.3 m of setup.draw_z"),
         ("plan", {"draw": (-0.3, 0.5)}, "z = 0.5 m lies 0.5 m beyond the 0 m of setup.draw_z"),
         ("plan", {"draw": (-1e-300, 0.0)}, "draw by 0.251 m at least, not 0.000 m"),
         ("plan", {"draw": (-0.2, 0.0)}, "stretches the band to 0.93 of its rest length"),
         ("plan", {"floor_clearance": 0.4}, "0.318 m above the floor, 0.082 m less than plan.floor"),
         ("plan", {"orientation": (0.5, 0.5, 0.5, -0.5)}, "plan.orientation: the fingers (z) would"),
-        ("bands", None, "plan.gripper.open: 0.08 m is no wider than the band, 0.09 m thick"),
+        (
+            "bands.band1",
+            {"diameter": 0.09},
+            "plan.gripper.open: 0.08 m is no wider than the band, 0.09",
+        ),
         ("episode", {"longest": 7.0}, "it takes 7.71 s, 1.51 s more than episode.longest 7 less"),
         ("plan", {"pull_speed": 0.05}, "raise plan.pull_speed to 0.052, or episode.longest to "),
         ("plan", {"dips": (dip(depth=0.4),)}, "dip 1 lets the band back by 0.4 m from 0.4 m, and"),
@@ -243,12 +249,8 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
     ],
 )
 def test_what_is_refused_and_how_it_is_said(params, section, values, expected) -> None:
-    if section == "bands":
-        changed = with_(params, "bands.band1", diameter=0.09)
-    else:
-        changed = with_(params, section, **values)
     with pytest.raises(UserError) as error:
-        plan_recording(changed, "band1")
+        plan_recording(with_(params, section, **values), "band1")
     assert expected in str(error.value) and "\n" not in str(error.value)
 
 
@@ -309,7 +311,7 @@ def test_a_designed_pull_says_what_it_is_worth(params, tmp_path, monkeypatch) ->
 
     other = {name: method for name, method in params.methods.items() if name != "least_squares"}
     with pytest.raises(UserError, match="no method has search: least_squares and law: rubber"):
-        plan_recording(params.model_copy(update={"methods": other}), "band1", pull="designed")
+        plan_recording(with_(params, "", methods=other), "band1", pull="designed")
 
 
 def test_speed_and_acceleration_of_any_trajectory(params) -> None:
@@ -318,10 +320,10 @@ def test_speed_and_acceleration_of_any_trajectory(params) -> None:
     fast = Trajectory.through(np.zeros(3), 0.0, leg)
     with pytest.raises(UserError, match=r"lift reaches 0.8 m/s, 0.4 more than plan.max_speed 0.4"):
         limits.check_motion(fast, params.plan)
-    loose = params.plan.model_copy(update={"max_speed": 0.8})
+    loose = with_(params.plan, "", max_speed=0.8)
     with pytest.raises(UserError, match=r"lift reaches 3.2 m/s\^2, 1.2 more than plan.max_acc"):
         limits.check_motion(fast, loose)
-    limits.check_motion(fast, loose.model_copy(update={"max_acceleration": 3.2}))
+    limits.check_motion(fast, with_(loose, "", max_acceleration=3.2))
 
 
 def test_a_held_string_pulls_as_its_formula() -> None:

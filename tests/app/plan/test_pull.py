@@ -49,7 +49,7 @@ def test_the_default_is_the_pull_that_the_method_was_made_with() -> None:
 
 
 def test_plan_hanging_comes_before_the_catenary() -> None:
-    measured = PARAMS.plan.model_copy(update={"hanging": 0.19})
+    measured = with_(PARAMS.plan, "", hanging=0.19)
     middle = hanging_middle(measured, PARAMS.setup, PARAMS.bands["band1"])
     np.testing.assert_array_equal(middle, [0, 0, -0.19])
     string = hanging_middle(PARAMS.plan, PARAMS.setup, PARAMS.bands["band1"])
@@ -110,7 +110,7 @@ def test_each_of_several_pulls_is_the_first_again_and_finds_the_band_calm(
 ) -> None:
     """What the next pull's window shows begins when the last swing is over."""
     plan = PlanParams.model_validate(content)
-    episode = PARAMS.episode.model_copy(update={"duration": duration, "tail": share * duration})
+    episode = with_(PARAMS.episode, "", duration=duration, tail=share * duration)
     rest = PARAMS.setup, episode, PARAMS.bands["band1"], AHEAD
     single, way = (trajectory_of(plan, *rest, count, precondition) for count in (1, pulls))
     np.testing.assert_array_equal(way.times[: len(single.times)], single.times)
@@ -136,7 +136,7 @@ def test_each_of_several_pulls_is_the_first_again_and_finds_the_band_calm(
 @given(content=PLANS, angle=number(-1.5, 1.5), duration=number(1, 120), share=number(0.01, 0.9))
 def test_any_plan_rests_in_time_and_within_its_limits(content, angle, duration, share) -> None:
     plan = PlanParams.model_validate(content)
-    episode = PARAMS.episode.model_copy(update={"duration": duration, "tail": share * duration})
+    episode = with_(PARAMS.episode, "", duration=duration, tail=share * duration)
     axis = np.array([0.0, np.cos(angle), np.sin(angle)])
     way = trajectory_of(plan, PARAMS.setup, episode, PARAMS.bands["band1"], axis)
     names = [phase.name for phase in way.phases]
@@ -164,7 +164,7 @@ def test_a_dip_lets_the_band_back_and_draws_it_again() -> None:
     """One on the way and one at the draw; the parts of the pull keep to its speed."""
     halfway = Dip(at=0.5, depth=0.05, out_time=0.4, back_time=0.6)
     deep = Dip(at=1.0, depth=0.3, out_time=2.0, back_time=3.0)
-    settings = PARAMS.plan.model_copy(update={"dips": (deep, halfway)})
+    settings = with_(PARAMS.plan, "", dips=(deep, halfway))
     rest = PARAMS.setup, PARAMS.episode, PARAMS.bands["band1"], AHEAD
     way = trajectory_of(settings, *rest)
     names = [phase.name for phase in way.phases]

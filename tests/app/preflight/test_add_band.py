@@ -8,11 +8,26 @@ import pytest
 from app.preflight.add_band import add_band
 from pipeline.base.errors import UserError
 from pipeline.params import load
-from tests.project import DEFAULTS, content
+from tests.project import DEFAULTS, contents
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A project's folder whose window suits the small recordings."""
+    text = DEFAULTS.read_text()
+    for old, new in (
+        ("duration: 9.0", "duration: 3.6"),
+        ("samples: 300", "samples: 120"),
+        ("tail: 0.7", "tail: 0.5"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "params.yaml").write_text(text)
+    return tmp_path
 
 
 def add(project: Path, recording: Path, name: str = "red", **changes) -> str:
-    values = {"mass": 0.0408, "params_path": project / "params.yaml", "root": project, **changes}
+    values = {"mass": 0.0408, "root": project, **changes}
     return add_band(name, [recording], **values)
 
 
@@ -46,17 +61,17 @@ def test_a_band_is_added_and_nothing_else_changes(project, seen, blind) -> None:
     )
     assert (project / "data/raw/red/seen.mcap").read_bytes() == seen[0].read_bytes()
 
-    written = content(project)
+    written = contents(project)
     assert "nothing to do" in add(project, seen[0])
     with pytest.raises(UserError, match="other values"):
         add(project, seen[0], mass=0.05)
     with pytest.raises(UserError, match="holds other recordings already"):
         add(project, blind[0])
-    assert content(project) == written
+    assert contents(project) == written
 
     (project / "data/raw/red/seen.mcap").unlink()  # as in a clone of a project that has the band
     add(project, seen[0])
-    assert content(project) == written
+    assert contents(project) == written
 
 
 @pytest.mark.parametrize(
@@ -79,15 +94,15 @@ def test_a_band_is_added_and_nothing_else_changes(project, seen, blind) -> None:
     ],
 )
 def test_bad_input_writes_nothing(project, seen, changes, words) -> None:
-    before = content(project)
+    before = contents(project)
     with pytest.raises(UserError, match=words) as caught:
         add(project, **{"recording": seen[0], **changes})
     assert "\n" not in str(caught.value)
-    assert content(project) == before
+    assert contents(project) == before
 
 
 def test_a_recording_that_cannot_be_used_writes_nothing(project, blind) -> None:
-    before = content(project)
+    before = contents(project)
     with pytest.raises(UserError, match="empty mask"):
         add(project, blind[0])
-    assert content(project) == before
+    assert contents(project) == before

@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from app.preflight.check import ASSUMED, band_of, check_recording
+from app.preflight.check import ASSUMED, band_of, look_at
 from app.preflight.command import check
 from app.preflight.facts import BandFacts
 from app.preflight.report import CheckReport
@@ -79,7 +79,7 @@ def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
 
     path = tmp_path / "poor.mcap"
     write_bag(path, Truth(noise=0.6), rate=500, without=("gripper",), change=edit(wrench=lose))
-    report = check_recording(path, with_(params, "setup", max_force=15.0))
+    report = look_at(path, with_(params, "setup", max_force=15.0)).report
     assert report.usable and report.verdict == "can be used, but:"
     output = {"gripper", "picture_rate", "force_rate", "gap", "pause", "max_force", "noise"}
     assert output <= abouts(report)
@@ -95,7 +95,7 @@ def test_a_clock_ahead_is_shown_with_its_sign(tmp_path, params) -> None:
         message.header = head(stamp + 200_000_000, message.header.frame_id)
 
     path = blind_bag(tmp_path, change=edit(pose=ahead))
-    rows = {row.role: row for row in check_recording(path, params).topics}
+    rows = {row.role: row for row in look_at(path, params).report.topics}
     assert rows["pose"].clock_offset == pytest.approx(0.2, abs=0.001)
     assert rows["wrench"].clock_offset == 0
     assert rows["depth"].clock_offset == pytest.approx(-0.0155, abs=0.001)  # it takes a while
@@ -119,7 +119,7 @@ def test_a_disk_that_is_full_is_one_line(seen, params, tmp_path, monkeypatch) ->
 
 def test_the_report_of_a_bad_recording(tmp_path, params) -> None:
     path = blind_bag(tmp_path, without=("wrench",))
-    report = check_recording(path, params)
+    report = look_at(path, params).report
     assert not report.usable
     assert "no force" in json.loads(report.to_json())["problem"]
     assert "cannot be used: no force" in report.to_text()

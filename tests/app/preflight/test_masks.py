@@ -17,10 +17,12 @@ from app.flow import child
 from app.preflight.command import check
 from app.preflight.recordings import add_recording
 from pipeline.base.errors import UserError
-from tests.app.preflight.test_add_band import add
-from tests.project import content, with_
+from tests.app.preflight.test_add_band import add, project
+from tests.project import contents, with_
 from tests.recording.joined import joined
 from validation.recordings.bag import Truth, blind_bag
+
+__all__ = ["project"]
 
 COLOR = "/camera/color/compressed"
 
@@ -70,7 +72,7 @@ def test_masks_alone_are_copied_with_their_recording(by_folder, masked, mine) ->
     lost.unlink()
     with pytest.raises(UserError, match="masks of 1 of 54 pictures are missing"):
         add(by_folder, mine)
-    assert content(by_folder) == {"params.yaml": before}
+    assert contents(by_folder) == {Path("params.yaml"): before}
     lost.write_bytes(retained)
     add(by_folder, mine)
     assert masks(by_folder / "data/raw/red/masked.masks") == masks(masked.with_suffix(".masks"))
@@ -85,7 +87,7 @@ def test_a_further_recording_brings_its_masks(project, by_folder, masked, tmp_pa
     more = tmp_path / "more.mcap"
     joined(more, [masked, masked])  # other bytes, and the first pull's stamps are the same
     shutil.copytree(masked.with_suffix(".masks"), tmp_path / "more.masks")
-    output = add_recording("red", [more], project / "params.yaml", project)
+    output = add_recording("red", [more], project)
     assert "1 pull" in output and "pull 2: left out" in output
     assert masks(project / "data/raw/red/more.masks") == masks(tmp_path / "more.masks")
 
@@ -135,8 +137,8 @@ def test_pictures_are_those_to_mask_by_their_names(blind, seen, masked, params, 
             )
             np.testing.assert_array_equal(ours, theirs)
     assert count == 54
-    chosen = with_(params, "cloud", mask="folder")
-    text, status = check(blind[0], chosen, pictures=tmp_path / "b")
+    by_folder = with_(params, "cloud", mask="folder")
+    text, status = check(blind[0], by_folder, pictures=tmp_path / "b")
     assert status == 1 and "no such folder of masks" in text  # pictures come before masks
     assert "pictures to mask" in text and len(masks(tmp_path / "b")) == 54
 
@@ -155,10 +157,10 @@ def test_pictures_go_to_a_new_folder(seen, params, tmp_path, name, words) -> Non
     (tmp_path / "there").mkdir()
     (tmp_path / "there" / "mine.txt").write_text("mine")
     (tmp_path / "file").write_text("mine")
-    before = content(tmp_path)
+    before = contents(tmp_path)
     with pytest.raises(UserError, match=words):
         check(seen[0], params, pictures=tmp_path / name)
-    assert content(tmp_path) == before
+    assert contents(tmp_path) == before
 
 
 def test_nothing_is_written_of_a_recording_that_is_not_understood(params, tmp_path) -> None:

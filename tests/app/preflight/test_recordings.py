@@ -15,10 +15,12 @@ from pipeline.base.layout import Layout
 from pipeline.params import load
 from pipeline.recording.build import build_episodes
 from stages import episode
-from tests.app.preflight.test_add_band import add
-from tests.project import content
+from tests.app.preflight.test_add_band import add, project
+from tests.project import contents
 from tests.recording.joined import joined
 from tests.recording.split import metadata, split
+
+__all__ = ["project"]
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +31,7 @@ def three(seen, blind, tmp_path_factory) -> tuple[Path, list[float]]:
 
 
 def more(project: Path, *recordings: Path, band: str = "red") -> str:
-    return add_recording(band, recordings, project / "params.yaml", project)
+    return add_recording(band, recordings, project)
 
 
 def test_check_lists_the_pulls_and_looks_at_the_first_that_can_be_used(three, seen, params):
@@ -85,7 +87,7 @@ def test_episodes_of_a_check_are_the_stages(project, seen, monkeypatch) -> None:
     monkeypatch.setattr(episode, "started", lambda *_: (params, "red"))
     episode.main()
     made.save(project / "made")
-    assert content(project / "made") == content(layout.episode("red"))
+    assert contents(project / "made") == contents(layout.episode("red"))
     assert not (project / ".checkpoints/red-episodes").exists()
 
 
@@ -118,7 +120,7 @@ def test_a_split_bag_is_checked_and_kept_as_its_folder(project, seen, params, tm
 def test_a_band_of_several_recordings(project, seen, three) -> None:
     from app.preflight.add_band import add_band
 
-    rest = {"mass": 0.0408, "params_path": project / "params.yaml", "root": project}
+    rest = {"mass": 0.0408, "root": project}
     message = add_band("red", [three[0], seen[0]], **rest)
     assert message.startswith("red added, 3 pulls\n")
     assert "nothing to do" in add_band("red", [seen[0], three[0]], **rest)
@@ -135,7 +137,7 @@ def test_what_is_there_or_cannot_be_used_is_refused_and_nothing_is_copied(
     shutil.copy(three[0], other)
     torn.write_bytes(b"no recording")
     add(project, seen[0])
-    written = content(project)
+    written = contents(project)
     for recordings, words in (
         ([again], "again.mcap: is there already, as .*seen.mcap"),
         ([other], "seen.mcap is there already: give .* another name"),
@@ -147,7 +149,7 @@ def test_what_is_there_or_cannot_be_used_is_refused_and_nothing_is_copied(
     ):
         with pytest.raises(UserError, match=words) as caught:
             more(project, *recordings)
-        assert "\n" not in str(caught.value) and content(project) == written
+        assert "\n" not in str(caught.value) and contents(project) == written
     with pytest.raises(UserError, match="--band"):
         more(project, three[0], band="blue")
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from ruamel.yaml import YAML
 
 from pipeline.base.layout import Layout
 from pipeline.params import Params, load
@@ -16,7 +15,7 @@ from pipeline.report.card.inputs import CardInputs, card_inputs
 from pipeline.simulator.parameters import EXTRA
 from tests import once
 from tests.policy.stored import write_stored
-from tests.project import DEFAULTS, set_methods
+from tests.project import write_params_of
 from validation.projects import ROUGH
 from validation.recordings.bag import Truth, write_bag
 
@@ -72,6 +71,12 @@ def confidence() -> dict:
     }
 
 
+def theta_file(band: str) -> dict:
+    theta = {"band": band, "method": METHOD, "law": "rubber", "theta": THETA}
+    theta |= {"history": {"pull_time": 1.4, "pause": 0.6}, "nuisances": {"air_drag": 0.3}}
+    return theta | {"turn_damping": 0.2, "returned_share": 1.0, "confidence": confidence()}
+
+
 def trials() -> pd.DataFrame:
     """Two measured launches, both inside their intervals."""
     return pd.DataFrame(
@@ -82,25 +87,15 @@ def trials() -> pd.DataFrame:
 
 
 def make(root: Path) -> None:
-    yaml = YAML()
-    content = yaml.load(DEFAULTS)
-    content["run"].update(bands=[BAND], rig=[], dips=[])
-    content["run"]["ablations"].update(bands=[], rig=[])
-    set_methods(content, [METHOD])
-    band = {"source": "recording", "mass": 0.03, "diameter": 0.01, "rest_length": 0.52}
-    content["bands"][BAND] = band
-    content["episode"].update(duration=3.6, samples=120, tail=0.5)
-    content["sling"].update(ROUGH)
-    yaml.dump(content, root / "params.yaml")
+    episode = {"duration": 3.6, "samples": 120, "tail": 0.5}
+    write_params_of(root, BAND, METHOD, 0.03, episode=episode, sling=ROUGH)
     params, layout = load(root / "params.yaml"), Layout(root)
     layout.raw(BAND).mkdir(parents=True)
     recording = layout.raw(BAND) / "seen.mcap"
     write_bag(recording, TRUTH)
     episode = build_episodes(recording, BAND, params)[0][0]
     episode.save(layout.episode(BAND))
-    theta = {"band": BAND, "method": METHOD, "law": "rubber", "theta": THETA}
-    theta |= {"history": {"pull_time": 1.4, "pause": 0.6}, "nuisances": {"air_drag": 0.3}}
-    theta |= {"turn_damping": 0.2, "returned_share": 1.0, "confidence": confidence()}
+    theta = theta_file(BAND)
     posterior = {"names": [*POINT], "samples": samples().tolist()}
     for path, summary in (
         (layout.theta(BAND, METHOD), theta),

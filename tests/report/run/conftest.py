@@ -7,16 +7,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from ruamel.yaml import YAML
 
 from pipeline.episode.episode import Episode
 from pipeline.identify.search.regions import Region, save_regions
 from pipeline.launching.trials.measured import save_scores
 from pipeline.params import load
+from pipeline.report.run import report as reporting
+from pipeline.report.run import write as writing
 from pipeline.report.run.results import Result, Results, gather
 from pipeline.simulator.parameters import THETA as NAMES
 from tests.policy.stored import write_stored
-from tests.project import DEFAULTS, set_methods
+from tests.project import DEFAULTS, write_params_of
+from tests.report.run.toy_replay import toy_landscape, toy_replay
 
 BAND, METHOD = "toy", "sling2sim2real"
 THETA = {
@@ -117,14 +119,8 @@ def posterior() -> dict:
 @pytest.fixture(scope="session")
 def template(tmp_path_factory) -> Path:
     """A project folder with params.yaml and everything that the report reads."""
-    root, yaml = tmp_path_factory.mktemp("report"), YAML()
-    content = yaml.load(DEFAULTS)
-    content["run"].update(bands=[BAND], rig=[], dips=[])
-    content["run"]["ablations"].update(bands=[], rig=[])
-    set_methods(content, [METHOD])
-    band = {"source": "recording", "mass": 0.04, "diameter": 0.01, "rest_length": 0.52}
-    content["bands"][BAND] = band
-    yaml.dump(content, root / "params.yaml")
+    root = tmp_path_factory.mktemp("report")
+    write_params_of(root, BAND, METHOD, 0.04)
     data = root / "data"
     for name in ("evaluations", "clusters", "theta", "confidence", "trials", "launches"):
         (data / name / BAND).mkdir(parents=True)
@@ -152,27 +148,22 @@ def template(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def no_simulation(monkeypatch) -> None:
-    from pipeline.report.run import report
-    from tests.report.run.toy_replay import toy_landscape, toy_replay
+def root(template: Path, tmp_path: Path) -> Path:
+    """A copy of the template, to change."""
+    return shutil.copytree(template, tmp_path, dirs_exist_ok=True)
 
-    monkeypatch.setattr(report, "replay_method", toy_replay)
-    monkeypatch.setattr(report, "landscape", toy_landscape)
+
+@pytest.fixture
+def no_simulation(monkeypatch) -> None:
+    monkeypatch.setattr(reporting, "replay_method", toy_replay)
+    monkeypatch.setattr(reporting, "landscape", toy_landscape)
 
 
 @pytest.fixture
 def text_alone(monkeypatch) -> None:
     """Pictures and the page take seconds, and tell a test of the text nothing."""
-    from pipeline.report.run import report, write
-
-    monkeypatch.setattr(report.Report, "picture", lambda _, name, *__: f"{name}.png")
-    monkeypatch.setattr(write, "write_page", lambda *_: None)
-
-
-@pytest.fixture
-def root(template: Path, tmp_path: Path) -> Path:
-    """A copy of the template, to change."""
-    return shutil.copytree(template, tmp_path, dirs_exist_ok=True)
+    monkeypatch.setattr(reporting.Report, "picture", lambda _, name, *__: f"{name}.png")
+    monkeypatch.setattr(writing, "write_page", lambda *_: None)
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipeline.report.run.write import write
+from pipeline.report.run import write as writing
 from tests.visit import DESKTOP, PHONE, overflow, visited
 
 FOREIGN = "new Image().src = 'http://example.invalid/picture.png'"
@@ -16,7 +16,7 @@ LOADED = """[...document.images].map(one => (one.loading = "eager", one.decode()
 @pytest.mark.parametrize("width", [DESKTOP, PHONE])
 def test_the_page_runs_alone(root, params, no_simulation, width: int) -> None:
     """On a phone, tables are wider than the window, and scroll within themselves."""
-    write(params, root)
+    writing.write(params, root)
     with visited(root / "reports" / "index.html", width) as seen:
         sizes = seen.page.evaluate(LOADED)
         assert len(sizes) > 5 and min(sizes) > 100

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from pipeline.report.run.write import write
+from pipeline.report.run import write as writing
 from tests.edited import outcomes
 from tests.report.run.conftest import BAND, METHOD
 
@@ -16,9 +16,8 @@ FILES = {
 
 
 @pytest.mark.parametrize("name", FILES)
-@pytest.mark.usefixtures("no_simulation", "text_alone")
-def test_any_edit_is_one_line_or_a_report(name, root, params) -> None:
+def test_any_edit_is_one_line_or_a_report(name, root, params, no_simulation, text_alone) -> None:
     path = root / FILES[name]
     content = json.loads(path.read_text())
-    accepted, refused = outcomes(path, content, lambda: write(params, root))
+    accepted, refused = outcomes(path, content, lambda: writing.write(params, root))
     assert refused > accepted > 0

@@ -2,9 +2,6 @@
 
 import json
 import math
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +9,7 @@ import pytest
 from pipeline.base.files import write_json
 from pipeline.report.run.metrics import summary
 from tests.report.run.tables.toy_results import floor, launches, result, results
+from validation.projects import ProjectCopy
 
 MAIN, THEIRS = "least_squares", "sling2sim2real"
 COLUMNS = 120
@@ -49,19 +47,6 @@ def test_a_band_that_was_never_launched_shows_its_modulus() -> None:
     assert summary(results(result("mine", MAIN, nothing)), MAIN, None) == {"mine_kPa": 300.0}
 
 
-def dvc(root: Path, *words: str) -> str:
-    wide = os.environ | {"COLUMNS": str(COLUMNS)}
-    done = subprocess.run(
-        [sys.executable, "-m", "dvc", *words],
-        cwd=root,
-        env=wide,
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    return done.stdout
-
-
 def test_three_bands_fit_a_terminal_and_pictures_need_no_network(tmp_path) -> None:
     """As DVC itself shows them; a plot of data would have its page load Vega."""
     names = "band1_cm", "band2_cm", "band3_cm", "floors", "paper_cm", "failed"
@@ -72,10 +57,11 @@ def test_three_bands_fit_a_terminal_and_pictures_need_no_network(tmp_path) -> No
     plots = "plots:\n  - reports/figures\n"
     assert plots in Path("dvc.yaml").read_text()
     (tmp_path / "dvc.yaml").write_text(f"metrics:\n  - reports/summary.json\n{plots}")
-    dvc(tmp_path, "init", "--no-scm", "--quiet")
-    lines = dvc(tmp_path, "metrics", "show").splitlines()
+    project = ProjectCopy(tmp_path, COLUMNS=str(COLUMNS))
+    project("dvc", "init", "--no-scm", "--quiet")
+    lines = project("dvc", "metrics", "show").splitlines()
     assert len(lines) == 2 and max(map(len, lines)) <= COLUMNS
-    dvc(tmp_path, "plots", "show", "--quiet")
+    project("dvc", "plots", "show", "--quiet")
     page = (tmp_path / "dvc_plots" / "index.html").read_text()
     assert "one.png" in page and "http" not in page and "<script" not in page
     assert json.loads((tmp_path / "reports" / "summary.json").read_text()) == some

@@ -94,9 +94,8 @@ def test_other_settings_of_the_campaign_are_named_beside_its_numbers(tmp_path) -
     repeated = written(tmp_path, results())
     assert repeated.changed_settings(PARAMS) == []
     ours = with_(PARAMS, "optimizer", cma_rollouts=840)
-    methods = PARAMS.methods | {"bo": PARAMS.methods["de"]}
-    methods["adam"] = PARAMS.methods["adam"].model_copy(update={"mounting": False})
-    ours = with_(ours, "trials", targets=(1.9,)).model_copy(update={"methods": methods})
+    ours = with_(with_(ours, "trials", targets=(1.9,)), "methods", bo=PARAMS.methods["de"])
+    ours = with_(ours, "methods.adam", mounting=False)
     keys = ["methods.adam.mounting", "optimizer.cma_rollouts", "trials.targets"]
     assert [setting.key for setting in repeated.changed_settings(ours)] == keys
     message = claims(repeated, ours)

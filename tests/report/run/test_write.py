@@ -15,10 +15,8 @@ from pipeline.report.run import write as writing
 from tests.project import with_
 from tests.report.run.conftest import BAND, METHOD
 
-THETA_FILE = f"data/theta/{BAND}/{METHOD}.json"
-
-
 pytestmark = pytest.mark.usefixtures("no_simulation")
+THETA_FILE = f"data/theta/{BAND}/{METHOD}.json"
 
 
 def written(root, params) -> str:
@@ -46,7 +44,7 @@ def committed(root) -> dict:
 
 def rig(root, params, bands: tuple[str, ...]):
     """Parameters of a run in which the rig records and launches `bands`, all alike but by name."""
-    data, yaml = root / "data", {"source": "rig"}
+    data = root / "data"
     for band in bands:
         for file in data.glob(f"*/{BAND}"):
             shutil.copytree(file, file.with_name(band))
@@ -66,14 +64,10 @@ def rig(root, params, bands: tuple[str, ...]):
         floor = {"mean_error_m": 0.02, "launches": 5, "actuation_error_m": 1e-3}
         floor |= {"release_jitter": 0.02, "targets": {}}
         (data / "floor" / f"{band}.json").write_text(json.dumps(floor))
-    more = params.run.ablations.model_copy(
-        update={"bands": bands[:1], "methods": ("de", "no_work")}
-    )
-    run = params.run.model_copy(
-        update={"bands": bands, "rig": bands, "methods": METHODS[:4], "ablations": more}
-    )
-    band_params = params.bands[BAND].model_copy(update=yaml)
-    return params.model_copy(update={"run": run, "bands": dict.fromkeys(bands, band_params)})
+    params = with_(params, "run", bands=bands, rig=bands, methods=METHODS[:4])
+    params = with_(params, "run.ablations", bands=bands[:1], methods=("de", "no_work"))
+    of_rig = with_(params.bands[BAND], "", source="rig")
+    return with_(params, "", bands=dict.fromkeys(bands, of_rig))
 
 
 METHODS = (

@@ -39,7 +39,7 @@ def test_a_floor_counts_what_failed_and_averages_the_rest(params) -> None:
     assert [row["draw"] for row in none["targets"].values()] == [None] * len(targets)
 
 
-def test_a_floor_is_read_or_refused_by_its_name(tmp_path, params) -> None:
+def test_a_floor_is_outcomes_by_its_name(tmp_path, params) -> None:
     path = tmp_path / "band1.json"
     with pytest.raises(UserError, match="band1.json: missing"):
         load_floor(path)

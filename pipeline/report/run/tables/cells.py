@@ -52,12 +52,12 @@ def without_empty(table: Table) -> Table:
     return [heads[n] for n in filled], [[row[n] for n in filled] for row in rows]
 
 
-def without_repeats(rows: list[list[str]], columns: int = 2) -> list[list[str]]:
-    """Rows whose first cells are blank where they repeat those of the row above."""
+def without_repeats(rows: list[list[str]]) -> list[list[str]]:
+    """Rows whose first two cells are blank where they repeat those of the row above."""
     shown = []
     for above, row in zip([None, *rows], rows, strict=False):
         same = 0
-        while above and same < columns and row[same] == above[same]:
+        while above and same < 2 and row[same] == above[same]:
             same += 1
         shown.append([""] * same + row[same:])
     return shown

@@ -7,18 +7,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import root_scalar
 
-from pipeline.base.weight import READINGS
+from pipeline.base.weight import LONGEST, READINGS, tension
 from pipeline.identify.results.theta import calibrated, parameters_of
 from pipeline.params import Params
 from pipeline.report.drawing.styles import Styles
-from pipeline.report.run.hanging import hanging_stretch
 from pipeline.report.run.noise import landed
 from pipeline.report.run.results import Result, Results
 from pipeline.report.run.tables.benchmark import band_name, ordered
 from pipeline.report.run.tables.cells import NONE, Table, number
 from pipeline.report.run.tables.landings import LAUNCHED, of_kind
 from pipeline.simulator.launch import landing_gradient
+from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
+from pipeline.simulator.rubber import RUBBER, uniaxial
 
 BULLSEYE = 0.20  # m, the target's radius in the paper (III-C)
 
@@ -110,6 +113,29 @@ def hanging(params: Params, results: Results, methods: tuple[str, ...]) -> list[
                 lengths = {n: rest * hanging_stretch(sling, best, n) for n in READINGS}
                 rows.append(Hanging(band, method, rest, lengths, recorded))
     return rows
+
+
+def hanging_stretch(sling: ClampedBand, parameters: Parameters, strands: int) -> float:
+    """Stretch of a strand by the calibrated law, ten seconds after it was loaded.
+
+    That is where the law `rubber` has its modulus (simulator/rubber.py). Rubber is taken as
+    incompressible and as never loaded before. NaN: beyond LONGEST.
+
+    Args:
+        parameters: One sample.
+    """
+    value = parameters.sample()
+    shape = ("mooney_share", "upturn") if parameters.law == RUBBER else ()
+    curve = [value[name] for name in shape] or [0.0]
+    shear = value["youngs_modulus"] / 3
+
+    def missing(stretch: float) -> float:
+        stress = shear * float(uniaxial(np.array(stretch), *curve))
+        return stress * sling.area - tension(strands)
+
+    if missing(LONGEST) < 0:
+        return float("nan")
+    return float(root_scalar(missing, bracket=(1.0, LONGEST)).root)
 
 
 def hanging_table(rows: list[Hanging], styles: Styles) -> Table:

@@ -57,11 +57,9 @@ def difference(against: Against | None) -> str:
 
 
 def _mean(interval: MeanInterval | None) -> str:
-    return (
-        NONE
-        if interval is None
-        else f"{interval.mean:.1f} ({interval.low:.1f} to {interval.high:.1f})"
-    )
+    if interval is None:
+        return NONE
+    return f"{interval.mean:.1f} ({interval.low:.1f} to {interval.high:.1f})"
 
 
 def _p(against: Against | None) -> str:

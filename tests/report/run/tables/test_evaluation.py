@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from pipeline.base.weight import READINGS, tension
 from pipeline.report.drawing.styles import styles
 from pipeline.report.run.results import Results
 from pipeline.report.run.tables import evaluation
 from pipeline.report.run.tables.evaluation import Hanging
+from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 from tests.report.run.conftest import BAND, METHOD
 
 NAMED = styles([METHOD])
@@ -29,6 +32,18 @@ def test_the_slope_is_that_of_the_map(result) -> None:
     land = result.landing_map(draw + step).landing_y
     slope = np.hypot(land[0] - land[1], land[2] - land[3]) / 2e-4
     assert evaluation.steepness(result, draw)[0] == pytest.approx(slope, rel=1e-2)
+
+
+def test_a_band_hangs_as_its_law_says(params) -> None:
+    """By a law that can be solved by hand."""
+    band = ClampedBand.of(params.bands["band1"], params.setup, params.sling)
+    stiff, soft = (
+        Parameters.of("neo_hookean", np.array([young, 0.45, 1e-3, 0.5, 0.5])) for young in (3e5, 10)
+    )
+    for strands in READINGS:
+        stretch = evaluation.hanging_stretch(band, stiff, strands)
+        assert 1e5 * (stretch - stretch**-2) * band.area == pytest.approx(tension(strands))
+        assert np.isnan(evaluation.hanging_stretch(band, soft, strands))
 
 
 def test_hanging_lengths_stand_beside_the_rigs() -> None:

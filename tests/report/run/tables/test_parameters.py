@@ -11,7 +11,7 @@ from pipeline.identify.objective.box import SearchBox
 from pipeline.params import load
 from pipeline.report.drawing.styles import styles
 from pipeline.report.run.tables.parameters import as_table, at_edge, identified, records
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, with_
 from tests.report.run.conftest import THETA, confidence
 from tests.report.run.tables.toy_results import launches, result, results
 
@@ -36,11 +36,10 @@ def test_edge_of_the_box_on_both_scales() -> None:
 
 def test_the_edge_is_that_of_the_methods_own_bounds() -> None:
     """A method that searches ν within 0.44 to 0.45005 ended at its side at 0.45; others did not."""
-    method = PARAMS.methods["sling2sim2real"]
-    close = method.model_copy(update={"bounds": {"poissons_ratio": (0.44, 0.45005)}})
+    bounds = {"poissons_ratio": (0.44, 0.45005)}
+    close = with_(PARAMS, "methods.sling2sim2real", bounds=bounds)
     ran = results(result("band1", "sling2sim2real", TRIALS))
-    for variant, expected in ((method, False), (close, True)):
-        params = PARAMS.model_copy(update={"methods": {"sling2sim2real": variant}})
+    for params, expected in ((PARAMS, False), (close, True)):
         (ours,) = [row for row in identified(ran, params) if row.source == "virtual"]
         assert ours.values["poissons_ratio"].at_edge == expected
 

@@ -63,12 +63,10 @@ def write_params_of(
 
 def with_(params: Any, section: str, **values: object) -> Any:
     """`params` with other values in a section, such as rig.camera or bands.band1; "": its own."""
+    if not section and isinstance(params, Mapping):
+        return {**params, **values}
     if not section:
-        return (
-            {**params, **values}
-            if isinstance(params, Mapping)
-            else params.model_copy(update=values)
-        )
+        return params.model_copy(update=values)
     first, _, rest = section.partition(".")
     inner = params[first] if isinstance(params, Mapping) else getattr(params, first)
     return with_(params, "", **{first: with_(inner, rest, **values)})
@@ -85,19 +83,6 @@ def contents(folder: Path) -> dict[Path, bytes]:
     """All files below `folder`, by their places in it."""
     files = (file for file in folder.rglob("*") if file.is_file())
     return {file.relative_to(folder): file.read_bytes() for file in files}
-
-
-def git(folder: Path, *words: str) -> str:
-    """What Git prints in `folder`, in whose commits nobody has a name of his own."""
-    who = ("-c", "user.name=A", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false")
-    done = subprocess.run(["git", *who, *words], cwd=folder, check=True, capture_output=True)
-    return done.stdout.decode().strip()
-
-
-def commit_all(folder: Path) -> None:
-    """A Git repository whose only commit has all that is there."""
-    for words in (("init", "-q"), ("add", "-A"), ("commit", "-qm", "first")):
-        git(folder, *words)
 
 
 def until(happens: Callable[[], object], seconds: float = 90.0):

@@ -8,9 +8,10 @@ import pytest
 from app.flow.graph import outdated
 from pipeline.base.code import digest
 from pipeline.base.errors import UserError
-from tests.project import ROOT, commit_all, git, python, write_files
+from tests.project import ROOT, python, write_files
 from validation import figures
 from validation.figures import NOT_TOLD, OLDER, TODAY, UNKNOWN, as_json, listed, shown
+from validation.projects import ProjectCopy
 
 
 @pytest.fixture
@@ -18,8 +19,12 @@ def project(tmp_path: Path) -> Path:
     """A small project under Git, with the sources of a simulator and of a benchmark."""
     sources = "pipeline/simulator/solver.py", "pipeline/simulator/deep/er.py", "validation/bench.py"
     write_files(tmp_path, dict.fromkeys(sources, "a = 1\n"))
-    commit_all(tmp_path)
+    ProjectCopy(tmp_path).commit()
     return tmp_path
+
+
+def head(project: Path) -> str:
+    return ProjectCopy(project)("git", "rev-parse", "--short", "HEAD").strip()
 
 
 def write(project: Path, name: str, **content) -> None:
@@ -53,7 +58,7 @@ def test_a_campaign_may_have_a_folder(project: Path) -> None:
 
 
 def test_without_digests_the_simulator_and_the_commit_decide(project: Path) -> None:
-    commit, sling = git(project, "rev-parse", "--short", "HEAD"), project / "pipeline/simulator"
+    commit, sling = head(project), project / "pipeline/simulator"
     for content, state in (
         ({}, UNKNOWN),
         ({"commit": None, "simulator": digest(sling)}, UNKNOWN),
@@ -73,7 +78,7 @@ def test_without_digests_the_simulator_and_the_commit_decide(project: Path) -> N
 
 
 def test_since_the_commit_only_what_the_command_names_counts(project: Path) -> None:
-    commit = git(project, "rev-parse", "--short", "HEAD")
+    commit = head(project)
     (project / "pipeline/simulator/solver.py").write_text("a = 5\n")
     for command, state in (
         ("python -m validation.bench band1", TODAY),
@@ -135,7 +140,7 @@ def test_a_users_mistake(project: Path) -> None:
 
 
 def test_the_command_lists_each_committed_file() -> None:
-    names = git(ROOT, "ls-files", "reports/*.json")
+    names = ProjectCopy(ROOT)("git", "ls-files", "reports/*.json")
     done = python("-m", "app", "figures", "--json", folder=ROOT)
     summary = {load["file"] for load in json.loads(done.stdout)["figures"]}
     assert {*names.split()} <= summary and len(summary) > 20

@@ -234,7 +234,7 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
         (
             "bands.band1",
             {"diameter": 0.09},
-            "plan.gripper.open: 0.08 m is no wider than the band, 0.09",
+            "plan.gripper.open: 0.08 m is no wider than the band, 0.09 m thick",
         ),
         ("episode", {"longest": 7.0}, "it takes 7.71 s, 1.51 s more than episode.longest 7 less"),
         ("plan", {"pull_speed": 0.05}, "raise plan.pull_speed to 0.052, or episode.longest to "),

@@ -11,21 +11,6 @@ from pipeline.params import load
 from tests.project import DEFAULTS, contents
 
 
-@pytest.fixture
-def project(tmp_path: Path) -> Path:
-    """A project's folder whose window suits the small recordings."""
-    text = DEFAULTS.read_text()
-    for old, new in (
-        ("duration: 9.0", "duration: 3.6"),
-        ("samples: 300", "samples: 120"),
-        ("tail: 0.7", "tail: 0.5"),
-    ):
-        assert old in text
-        text = text.replace(old, new)
-    (tmp_path / "params.yaml").write_text(text)
-    return tmp_path
-
-
 def add(project: Path, recording: Path, name: str = "red", **changes) -> str:
     values = {"mass": 0.0408, "root": project, **changes}
     return add_band(name, [recording], **values)

@@ -17,12 +17,10 @@ from app.flow import child
 from app.preflight.command import check
 from app.preflight.recordings import add_recording
 from pipeline.base.errors import UserError
-from tests.app.preflight.test_add_band import add, project
+from tests.app.preflight.test_add_band import add
 from tests.project import contents, with_
 from tests.recording.joined import joined
 from validation.recordings.bag import Truth, blind_bag
-
-__all__ = ["project"]
 
 COLOR = "/camera/color/compressed"
 

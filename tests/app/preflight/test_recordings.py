@@ -15,12 +15,10 @@ from pipeline.base.layout import Layout
 from pipeline.params import load
 from pipeline.recording.build import build_episodes
 from stages import episode
-from tests.app.preflight.test_add_band import add, project
+from tests.app.preflight.test_add_band import add
 from tests.project import contents
 from tests.recording.joined import joined
 from tests.recording.split import metadata, split
-
-__all__ = ["project"]
 
 
 @pytest.fixture(scope="module")

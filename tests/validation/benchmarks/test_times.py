@@ -8,11 +8,12 @@ import pytest
 
 from app.cli import parser
 from pipeline.base.errors import UserError
-from tests.project import ROOT, commit_all, git, write_files
+from tests.project import ROOT, write_files
 from validation.benchmarks import times as bench
 from validation.benchmarks.times import BEGIN, END, MeasuredStep
 from validation.benchmarks.timing import disk, measured
 from validation.marked import with_block
+from validation.projects import ProjectCopy
 
 HUNDRED_MB = "import time; held = b'1' * 100_000_000; time.sleep({seconds})"
 AMONG_CHILDREN = f"""
@@ -45,7 +46,7 @@ def project(tmp_path: Path) -> Path:
         "app/cli.py": "",
     }
     write_files(root, files)
-    commit_all(root)
+    ProjectCopy(root).commit()
     return root
 
 
@@ -131,7 +132,7 @@ def test_steps_are_measured_once_and_failures_again(project: Path, tmp_path: Pat
     assert (project / "docs/times.md").read_text().count(bench.table(written)) == 1
     assert written["steps"]["setup"]["disk_bytes"]["venv"] >= 10000
     assert set(written["code"]) == {"app/cli.py", "pipeline/simulator", "stages/record.py"}
-    assert git(project, "rev-parse", "HEAD").startswith(written["commit"])
+    assert ProjectCopy(project)("git", "rev-parse", "HEAD").startswith(written["commit"])
 
 
 def test_a_page_without_marks_is_refused() -> None:

@@ -1,9 +1,9 @@
 # Each target works first on a fresh clone: it sets up .venv where that is missing or out of date.
-.PHONY: help setup demo run large paper ui test lint docs validate clean
+.PHONY: help setup demo run large paper ui test test-all durations lint docs validate clean
 .DEFAULT_GOAL := run
 
 help:                 # this list
-	@sed -n 's/^\([a-z][a-z ]*\):[^#]*# /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
+	@sed -n 's/^\([a-z][a-z -]*\):[^#]*# /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
 
 setup: .venv/ready    # .venv with everything that is needed
 
@@ -27,8 +27,14 @@ paper: setup          # the same as the paper prints it (presets/paper.yaml)
 ui: setup             # what `sling flow` does, in a browser on this machine: http://127.0.0.1:4200
 	@.venv/bin/sling ui
 
-test: setup           # the tests
+test: setup           # the tests that prove that it works: five minutes
 	.venv/bin/python -m pytest
+
+test-all: setup       # all tests but the campaigns: slow ones too, and ten times the examples
+	.venv/bin/python -m pytest -m 'not validation' --hypothesis-profile thorough
+
+durations: setup      # which tests take more than three CPU-seconds and are not marked slow
+	.venv/bin/python -m pytest -p tests.durations
 
 lint: setup           # ruff: rules and format; basedpyright: types; codespell; words
 	.venv/bin/ruff check .

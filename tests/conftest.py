@@ -17,6 +17,11 @@ from tests.project import DEFAULTS, ROOT
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as stages have it; nothing has imported NumPy yet
 
 
+# Hypothesis measures no time, for other programs have their share of it; the same examples each
+# time, for what fails on one machine should fail on another.
+settings.register_profile("quick", deadline=None, derandomize=True, max_examples=20)
+settings.register_profile("thorough", deadline=None, derandomize=True, max_examples=200)
+
 OF_A_USER = {f"{ROOT}/params.yaml", f"{ROOT}/sling2sim2real/params.yaml"}
 
 
@@ -43,15 +48,13 @@ def pytest_collection():
 def pytest_configure() -> None:
     """What a script starts in its background ignores Ctrl-C, and so would all that tests start.
 
-    Hypothesis measures no time: other programs have their share of it. Hundreds of processes
-    import the same modules: they are compiled once, whatever the environment says.
+    Hundreds of processes import the same modules: they are compiled once, whatever the environment
+    says.
     """
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     sys.dont_write_bytecode = False
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    settings.register_profile("untimed", deadline=None)
-    settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="module")

@@ -55,6 +55,7 @@ INSTALLED_AS = {
 }  # packages of extras whose distribution is called otherwise
 INDIRECT = {
     "physx-usd-schemas": "ovphysx reads scenes by it",
+    "newton-usd-schemas": "the same",
     "fastapi": "newer ones break Prefect's server",
     "mkdocs-material": "the theme of mkdocs.yml",
     "mkdocstrings": "a plug-in there",

@@ -58,7 +58,6 @@ CASES = {
     "export --to": (EXPORT, EXPORT.replace("mjcf", "yaml")),
     "remove-band name": ("remove-band mine --yes", "remove-band band1 --yes"),
     "reset keys": ("reset", "reset setup.tips"),
-    "bench --methods": ("bench --methods de", "bench --methods bo"),
     "--version": ("flow", "--version"),
 }
 # Command lines, and options that each is tried without and with.
@@ -86,9 +85,7 @@ ADDED = {
     "flow": "--workers 2, --gpus 2, --cluster nowhere",
     "ui": "--port 4300",
     "verify": "--device cuda:0",
-    "bench --methods de": "--device cuda:0, --scaling mine, --peers, --recording mine.mcap,"
-    " --budget large, --law rubber, --json",
-    "figures": "--json",
+    "bench": "--device cuda:0, --law rubber, --json",
 }
 CASES |= {
     f"{line.split()[0]} {option.split()[0].partition('=')[0]}": (line, f"{line} {option}")
@@ -182,10 +179,6 @@ def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
         message.to_json = lambda frames: json.dumps([repr(given[2:]), frames])
         return Look(message)
 
-    def bench(arguments: argparse.Namespace, what: str) -> str:
-        given = vars(arguments).items()
-        return summary(what, *(pair for pair in given if pair[0] not in ("command", "refuse")))
-
     def summary(*given, **more) -> str:
         requested.append((*map(str, given), sorted(map(str, more.items()))))
         return "done"
@@ -205,8 +198,11 @@ def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
         "validation.simulator.verification.verify", lambda _, device, extra: summary(device)
     )
     patch.setattr("validation.simulator.verification.summary", lambda done: (done, 0))
-    patch.setattr("validation.benchmarks.bench.bench", bench)
-    patch.setattr("validation.figures.listed", lambda *given: [])
+    patch.setattr("pipeline.base.environment.environment", lambda *given: {"given": given})
+    patch.setattr(
+        "validation.benchmarks.throughput.bench", lambda _, *what: {"bench": summary(*what)}
+    )
+    patch.setattr("validation.benchmarks.throughput.table", str)
 
 
 def once(outcomes: dict[str, tuple], outcome: Callable[[str], tuple], line: str) -> tuple:

@@ -33,7 +33,7 @@ IGNORED = {
 HEADS = "cannot be used", "can be used, but", "warning"  # tables of docs/faq.md
 PARAMS = YAML(typ="safe").load(DEFAULTS)
 STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
-TARGETS = set(re.findall(r"^([a-z][a-z ]*):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+TARGETS = set(re.findall(r"^([a-z][a-z -]*):", (ROOT / "Makefile").read_text(), re.MULTILINE))
 ELSEWHERE = {"git", "pre-commit"}
 
 

@@ -41,7 +41,6 @@ EXTRAS = {
     "tests/app/preflight/": "validation",
     "tests/rig/recorder/test_record.py": "validation",
     "tools/": "dev",
-    "tools/browser.py": "validation",
     "tools/site.py": "docs",
     "validation/": "validation",
     "validation/campaigns/": "dev",

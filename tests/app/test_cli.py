@@ -84,7 +84,6 @@ def test_a_command_line_that_makes_no_sense(refused) -> None:
         ("", "required: COMMAND"),
         ("lunch", "invalid choice: 'lunch'"),
         ("launch --theta t.json --band band1", "required: --draw"),
-        ("drift band1", "required: --band"),
         ("launch --theta t.json --band band1 --draw -0.30,-0.17", "joined by ="),
         ("launch --theta t.json --band band1 --draw=0.30,-0.17", "y must be below 0"),
         ("launch --theta t.json --band band1 --draw=-0.30", "must be Y,Z such as"),

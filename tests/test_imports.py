@@ -32,7 +32,8 @@ EXTRAS = {
     "pipeline/export/mujoco_replay.py": "validation",
     "pipeline/export/newton_band.py": "validation",
     "app/preflight/timeline.py": "rerun",
-    "pipeline/recording/masks/sam3.py": "sam3",
+    "examples/sam3_masks.py": "sam3",
+    "tests/examples/test_sam3_masks.py": "sam3",
     "tests/": "dev",
     "tests/recording/input/test_kinematics.py": "validation",  # skipped where that is missing
     "tests/recording/masks/": "validation",

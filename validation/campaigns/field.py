@@ -213,7 +213,7 @@ def report(args: argparse.Namespace, cases: list[Faulty], results: list[dict]) -
         "families": {name: _family(faulty, name) for name in families},
         "results": results,
     }
-    write_report(args.report, content, runner.orange_argument(args), digits=5)
+    write_report(args.report, content, "--orange FOLDER" if args.orange else "", digits=5)
     print(f"{args.report}: {len(results)} of {len(cases)}, {content['counts']}", flush=True)
     print(f"{len(alarms)} false alarms on {len(sound)} sound recordings")
 
@@ -258,7 +258,8 @@ def block(content: dict) -> str:
 
 
 def main() -> None:
-    parser = runner.parser(__doc__, REPORT, WORK, page=PAGE, orange=True)
+    parser = runner.parser(__doc__, REPORT, WORK)
+    parser.add_argument("--orange", type=Path, help="folder of the recordings of that band")
     parser.add_argument("--faults", nargs="+", default=[*FAULTS], help="(default: all)")
     args = parser.parse_args()
     if args.page:

@@ -176,7 +176,7 @@ def figures(lines: list[dict]) -> dict:
         )
         if not good:
             continue
-        of_bands = summaries(good, "band")
+        of_bands = summaries(good)
         result[kind] = {
             "together": together(of_bands),
             "settled": [sum(bool(line["confidence"]["settled"]) for line in good), len(good)],

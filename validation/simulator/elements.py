@@ -22,7 +22,7 @@ from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import Schedule, statics
 from pipeline.simulator.solver import Options, Slings, memory, run
 from validation.benchmarks.timing import timed
-from validation.marked import row
+from validation.reports import row
 from validation.simulator.closed import String, clamped_beam
 from validation.simulator.experiment import setup_of, straight
 from validation.simulator.finding import Bench, Theme

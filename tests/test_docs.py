@@ -176,7 +176,7 @@ def is_file(name: str) -> bool:
 
 
 def test_every_option_is_one() -> None:
-    """Commands inside sentences, of messages too: `sling check --sheet`; placeholders may follow."""
+    """Commands in sentences, of messages too: `sling check --sheet`; placeholders may follow."""
     subs = next(
         action for action in parser()._actions if action.choices and "check" in action.choices
     ).choices

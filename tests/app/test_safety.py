@@ -144,10 +144,10 @@ def test_a_theta_identified_anew_hides_no_change_of_the_policys(params, project)
 
 def test_many_changes_are_three_and_the_names_of_the_others(params, project) -> None:
     values = {f"setup.{name}": 1e-3 for name in ("max_force", "fork_width", "fork_height")}
-    card(project, made_with=trained(params, **values, **{"policy.seed": 7, "sling.mesh": "net"}))
+    card(project, made_with=trained(params, **values, **{"policy.seed": 7, "sling.edges": 12}))
     summary = of_policy(params, project)
     assert abouts(summary) == ["params"] * 4 and "policy.seed was 7, is 1" in summary[0].what
-    assert summary[3].what.endswith("also in setup.max_force, sling.mesh")
+    assert summary[3].what.endswith("also in setup.max_force, sling.edges")
 
 
 def test_a_card_that_does_not_tell(params, project) -> None:

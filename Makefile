@@ -36,12 +36,12 @@ test-all: setup       # all tests but the campaigns: slow ones too, and ten time
 durations: setup      # which tests take more than three CPU-seconds and are not marked slow
 	.venv/bin/python -m pytest -p tests.durations
 
-lint: setup           # ruff: rules and format; basedpyright: types; codespell; words
+lint: setup           # ruff: rules and format; basedpyright: types; codespell; code lines by folder
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/basedpyright
 	.venv/bin/codespell
-	.venv/bin/python tools/vocabulary.py
+	.venv/bin/python tools/size.py
 
 docs: setup           # the pages as a site, build/site/index.html; broken links fail
 	@.venv/bin/pip install --disable-pip-version-check -q -e '.[docs]' -c constraints.txt
@@ -50,15 +50,11 @@ docs: setup           # the pages as a site, build/site/index.html; broken links
 validate: setup       # slow campaigns, and tests by other engines and readers; results are committed
 	.venv/bin/pip install --disable-pip-version-check -q -e '.[dev,validation]' -c constraints.txt
 	.venv/bin/sling verify
-	SLING_BROWSER=required .venv/bin/python -m pytest tests/report/run/test_browser.py tests/report/card/test_write.py
 	.venv/bin/python -m pytest tests/validation/engines tests/validation/benchmarks tests/export tests/recording/masks \
 		tests/recording/input/test_kinematics.py tests/app/preflight/test_pictures.py \
 		tests/rig/recorder/test_record.py
-	.venv/bin/python -m validation.campaigns.mutations
 	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation tests/app/flow \
 		tests/recording/test_orange.py
-	.venv/bin/python -m validation.campaigns.kills
-	.venv/bin/python -m validation.campaigns.conditions
 
 clean:                # all but data, checkpoints and DVC's cache
 	rm -rf .venv build *.egg-info .hypothesis .pytest_cache .ruff_cache

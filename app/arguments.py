@@ -18,7 +18,7 @@ from pipeline.params.lab import BandParams
 
 METRES = {"centimetres": 1e-2, "millimetres": 1e-3}
 KILOGRAMS = {"grams": 1e-3}
-PULLS = "informative", "paper", "designed"
+PULLS = "informative", "paper"
 
 
 def quantity(unit: str, low: float, high: float, units: dict[str, float], usual: float) -> Callable:

@@ -107,20 +107,6 @@ def add_recording(arguments: argparse.Namespace) -> Done:
 
 
 @command(
-    "say whether a band changed: each recording identified alone, drawn over time",
-    "--band band1",
-    BAND,
-    JSON,
-)
-def drift(arguments: argparse.Namespace) -> Done:
-    from app.drift.drift import drift, shown
-    from sling2sim2real.settings import Settings
-
-    content = drift(Settings.load("params.yaml"), arguments.band)
-    return kinds.shown(content, True) if arguments.json else shown(content)
-
-
-@command(
     "say whether a recording can be used, what is missing and what costs accuracy",
     "my.mcap --rest-length 0.52 --sheet my.png",
     flag("recording", type=Path, metavar="FILE.mcap", help="or a bag's folder"),
@@ -197,7 +183,7 @@ def setup(arguments: argparse.Namespace) -> Done:
         "--pull",
         choices=kinds.PULLS,
         default=kinds.PULLS[0],
-        help="with plan.dips (the default), without, or with dips that are searched for this band",
+        help="with plan.dips (the default), or without",
     ),
     flag(
         "--precondition",
@@ -226,7 +212,6 @@ def plan(arguments: argparse.Namespace) -> Done:
         pull=arguments.pull,
         precondition=arguments.precondition,
         pulls=arguments.pulls,
-        progress=say,
     )
     files = plan.write(arguments.out or Layout().plans(band), arguments.rate)
     return plan.to_json(files) if arguments.json else plan.to_text(files)
@@ -338,7 +323,7 @@ def observe(arguments: argparse.Namespace) -> Done:
         "--to",
         required=True,
         choices=ENGINES,
-        help="MuJoCo's XML, numbers and a loader for Newton, plain numbers, PhysX's USD",
+        help="MuJoCo's XML, numbers and a loader for Newton, PhysX's USD",
     ),
     flag("--out", type=Path, metavar="FOLDER", help="default data/exports/<band>/<target>"),
     JSON,

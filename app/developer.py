@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from app import arguments as kinds
 from app.command_line import JSON, Done, command, flag
+from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
+
+LAWS = NEO_HOOKEAN, RUBBER
 
 
 @command(
@@ -27,39 +30,19 @@ def verify(arguments: argparse.Namespace) -> Done:
 @command(
     "measure rollouts and launches per second",
     "--law rubber --json",
-    flag("--device", help="cpu (default), cuda:0, cuda:0,cuda:1, or cuda: all GPUs"),
-    flag(
-        "--scaling",
-        nargs="?",
-        const="",
-        metavar="BAND",
-        help="several GPUs against one, on a band's recording or on the yardstick",
-    ),
-    flag("--peers", action="store_const", const=True, help="MuJoCo and Newton beside ours"),
-    flag("--recording", type=Path, metavar="FILE.mcap", help="time how a recording becomes clouds"),
-    flag("--methods", nargs="*", metavar="METHOD", help="time searches: all, or these methods"),
-    flag("--budget", choices=("laptop", "large"), help="of --methods, --scaling; default laptop"),
-    flag("--law", choices=("neo_hookean", "rubber"), help="of the band; default neo_hookean"),
+    flag("--device", default="cpu", help="cpu (default), cuda:0, cuda:0,cuda:1, or cuda: all GPUs"),
+    flag("--law", choices=LAWS, default=LAWS[0], help=f"of the band; default {LAWS[0]}"),
     JSON,
 )
 def bench(arguments: argparse.Namespace) -> Done:
-    from validation.benchmarks.bench import bench, requested
+    from pipeline.base.environment import environment
+    from pipeline.params import load
+    from validation.benchmarks import throughput
 
-    try:
-        what = requested(arguments)
-    except argparse.ArgumentTypeError as error:
-        return arguments.refuse(str(error))  # which exits
-    return bench(arguments, what)
-
-
-@command(
-    "say of which code each JSON under reports/ is, and whether it meets what it asks",
-    "--json",
-    JSON,
-)
-def figures(arguments: argparse.Namespace) -> Done:
-    from app.flow.graph import outdated
-    from validation.figures import as_json, listed, shown
-
-    committed = listed(Path.cwd(), outdated)
-    return as_json(committed) if arguments.json else shown(committed)
+    device, law = arguments.device, arguments.law
+    result = throughput.bench(load(), device, law)
+    if not arguments.json:
+        return throughput.table(result)
+    return kinds.shown(
+        environment(device, f"sling bench --law {law} --device {device} --json") | result, True
+    )

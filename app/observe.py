@@ -157,7 +157,7 @@ def softened(
     method_params = params.methods[method]
     note = "the launches after it count as of the softened band"
     if method_params.law != RUBBER or method_params.fixed.get("softening") == 0:
-        note = f"{method} leaves that out, a new recording and `sling drift` tell by how much"
+        note = f"{method} leaves that out, a new recording tells by how much"
     yield Hazard(
         "stretch",
         f"this launch drew {band} to {np.hypot(*draw):.3f} m, {before:.3f} m was the most before:"

@@ -37,7 +37,7 @@ def export(model: Model, to: str, out: str | Path, *, episode: Episode | None = 
     >>> band = Band(mass=0.023, diameter=0.010, rest_length=0.52)
     >>> model = Model(band, Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6), settings=Settings.coarse())
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     done = export(model, "yaml", folder)
+    ...     done = export(model, "usd", folder)
     ...     sorted(file.name for file in done.folder.iterdir())
     ['README.md', 'band.yaml', 'card.json']
 

@@ -32,7 +32,8 @@ EXTRAS = {
     "pipeline/export/mujoco_replay.py": "validation",
     "pipeline/export/newton_band.py": "validation",
     "app/preflight/timeline.py": "rerun",
-    "pipeline/recording/masks/sam3.py": "sam3",
+    "examples/sam3_masks.py": "sam3",
+    "tests/examples/test_sam3_masks.py": "sam3",
     "tests/": "dev",
     "tests/recording/input/test_kinematics.py": "validation",  # skipped where that is missing
     "tests/recording/masks/": "validation",
@@ -41,7 +42,6 @@ EXTRAS = {
     "tests/app/preflight/": "validation",
     "tests/rig/recorder/test_record.py": "validation",
     "tools/": "dev",
-    "tools/browser.py": "validation",
     "tools/site.py": "docs",
     "validation/": "validation",
     "validation/campaigns/": "dev",
@@ -55,6 +55,7 @@ INSTALLED_AS = {
 }  # packages of extras whose distribution is called otherwise
 INDIRECT = {
     "physx-usd-schemas": "ovphysx reads scenes by it",
+    "newton-usd-schemas": "the same",
     "fastapi": "newer ones break Prefect's server",
     "mkdocs-material": "the theme of mkdocs.yml",
     "mkdocstrings": "a plug-in there",

@@ -180,7 +180,7 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
     keys -= {key for key in keys if key.startswith("plan.")}  # read by `sling plan`, and the rig
     keys -= {f"bands.{name}" for name in content["bands"]} - {"bands.band1"}  # those that run
     # read for other recordings, or with another mask: tests/recording shows what they do
-    keys -= {*OF_OTHER_RECORDINGS, "cloud.sam3"}
+    keys -= {*OF_OTHER_RECORDINGS}
     idle = {key for key in keys if not any(covers(key, read) for read in everything_read)}
     assert not idle, "parameters that do nothing"
 

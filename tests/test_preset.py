@@ -14,7 +14,6 @@ from pipeline.base.errors import UserError
 from pipeline.params import load
 from tests.project import DEFAULTS, ROOT, until
 from tools.preset import KEPT, PRESETS, preset, store_report, timed, write_preset
-from validation.benchmarks.methods import LARGE
 
 RUN = ["sh", "-c", "test -e finish || exec sleep 60"]
 PRELUDE = "import sys; from pathlib import Path; from tools.preset import timed;"
@@ -72,10 +71,6 @@ def test_a_presets_keys_are_all_that_changes(name: str, tmp_path: Path) -> None:
     assert notes(before) == notes(after)
     write_preset(path, preset(name))  # again, as after a kill
     assert path.read_text(encoding="utf-8") == after
-
-
-def test_the_large_preset_is_the_large_budget() -> None:
-    assert preset("large") == {"optimizer": LARGE}
 
 
 def test_the_papers_preset_has_no_method_of_ours_and_searches_the_whole_box(tmp_path: Path) -> None:

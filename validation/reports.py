@@ -1,4 +1,4 @@
-"""Reports of scripts: figures as plain JSON, with machine, versions, command and code."""
+"""Reports of scripts: figures as plain JSON, with machine, versions, command and commit."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def write_report(
     """
     script = Path(sys._getframe(1).f_code.co_filename)
     module = ".".join(script.relative_to(ROOT).with_suffix("").parts).removesuffix(".__main__")
-    provenance = environment(device, f"python -m {module} {arguments}".rstrip(), script)
+    provenance = environment(device, f"python -m {module} {arguments}".rstrip())
     provenance["versions"] |= versions or {}
     report = provenance | plain(content, digits)
     write_json(path, report)

@@ -14,7 +14,7 @@ The rules, written before any of these sealed rubbers was run:
   targets, as validation/density.py scores it.
 - `sling plan` writes a dip by default, if over the develop rubbers and the rig's bands both the
   mean of |bias| and the median width of the intervals are less with it than with the paper's pull;
-  and three searched dips (validation/campaigns/pulls.py) instead, if both are less with these.
+  and three searched dips (reports/validation/pulls.json) instead, if both are less with these.
 - Of the recoil the pictures of the first 34 ms count instead of 50, if over the same 21 recordings
   by dips the mean of |bias| is at most 0.3 points more, and at most 3 points fewer launches are
   inside.

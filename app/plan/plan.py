@@ -8,7 +8,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -25,14 +24,11 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_json, write_text
 from pipeline.base.layout import Layout
 from pipeline.params import Params, expect_known
-from pipeline.params.lab import Dip, Gripper
+from pipeline.params.lab import Gripper
 from pipeline.recording.geometry import FORK
 from pipeline.recording.input.frames import Transform
 
-if TYPE_CHECKING:
-    from app.plan.design import DesignedPull
-
-INFORMATIVE, PAPER, DESIGNED = PULLS
+INFORMATIVE, PAPER = PULLS
 MOST_PULLS = 10  # a file of them is half a gigabyte
 NO_BASE = (
     "nothing says where it stands in the robot's base, so all is in frame O, which no robot knows:"
@@ -60,7 +56,6 @@ class Plan:
         hanging_source: Where the height of the hanging middle came from.
         pull: Of PULLS.
         dips: How many the pull has.
-        design: How they were found, where this plan did.
     """
 
     band: str
@@ -79,7 +74,6 @@ class Plan:
     hanging_source: str
     pull: str
     dips: int
-    design: DesignedPull | None = None
 
     def rows(self) -> list[dict]:
         """One row a phase, numbers in SI units."""
@@ -116,7 +110,6 @@ class Plan:
             "held_most_s": round(self.most_time, 6),
             "pull": self.pull,
             "dips": self.dips,
-            **({"design": self.design.content()} if self.design else {}),
             "stretch": self.stretch,
             "hold_force_n": self.force.force,
             "hold_force_source": self.force.source,
@@ -162,13 +155,11 @@ class Plan:
             "force": source,
         }
         lines += ["", *(f"{name:<10}{value}" for name, value in facts.items())]
-        if self.design:
-            lines += ["", self.design.to_text()]
         lines += ["", *(f"wrote {path}" for path in files)]
         return "\n".join(lines)
 
     def write(self, folder: Path, rate: float) -> list[Path]:
-        """Write trajectory.csv, waypoints.json, gripper.json, plan.png, design.png into a folder.
+        """Write trajectory.csv, waypoints.json, gripper.json and plan.png into a folder.
 
         Everything is made before the first file is written. Raises UserError.
         """
@@ -178,18 +169,14 @@ class Plan:
         gripper = messages.gripper_commands(self.trajectory, self.gripper.command, self.grip_force)
         picture = io.BytesIO()
         messages.draw_picture(self.trajectory, picture)
-        pictures = {"plan.png": picture.getvalue()}
-        if self.design:
-            pictures["design.png"] = self.design.picture()
-        names = ("trajectory.csv", "waypoints.json", "gripper.json", *pictures)
+        names = ("trajectory.csv", "waypoints.json", "gripper.json", "plan.png")
         files = [Path(folder, name) for name in names]
         try:
             write_text(files[0], table)
             write_json(files[1], waypoints)
             write_json(files[2], gripper)
-            for file, content in zip(files[3:], pictures.values(), strict=True):
-                with replacing(file) as temporary:
-                    temporary.write_bytes(content)
+            with replacing(files[3]) as temporary:
+                temporary.write_bytes(picture.getvalue())
         except OSError as error:
             raise UserError(f"{folder}: cannot be written ({error.strerror})") from error
         return files
@@ -270,26 +257,14 @@ def plan_recording(
     limits.check_hand(settings, band_params, axis, drawn)
     prediction = predict(params, band, drawn, theta, earlier)
 
-    def through(dips: tuple[Dip, ...]) -> tuple[Trajectory, tuple[float, float]]:
-        """The way with these dips, its time in the window, and what there is for it [s]."""
-        plan = settings.model_copy(update={"dips": dips})
-        limits.check_dips(plan)
-        way = trajectory_of(plan, setup, params.episode, band_params, axis, pulls, precondition)
-        limits.check_motion(way, plan)
-        limits.check_floor(way, setup, plan)
-        return way, limits.check_window(way, plan, params.episode, precondition)
-
-    dips, design = settings.dips if pull == INFORMATIVE else (), None
-    trajectory, (held_time, most_time) = through(dips)
+    dips = settings.dips if pull == INFORMATIVE else ()
+    plan = settings.model_copy(update={"dips": dips})
+    limits.check_dips(plan)
+    trajectory = trajectory_of(plan, setup, params.episode, band_params, axis, pulls, precondition)
+    limits.check_motion(trajectory, plan)
+    limits.check_floor(trajectory, setup, plan)
+    held_time, most_time = limits.check_window(trajectory, plan, params.episode, precondition)
     limits.check_force(setup, held, drawn, prediction)
-    if pull == DESIGNED:
-        from app.plan.design import designed_pull  # the simulator, which takes a second
-
-        design = designed_pull(
-            params, band, settings, trajectory, most_time, prediction.force, progress
-        )
-        dips = design.dips
-        trajectory, (held_time, most_time) = through(dips)
     below = -hanging_middle(settings, setup, band_params)[2]
     by = "as a string's catenary" if settings.hanging is None else "plan.hanging"
     return Plan(
@@ -309,7 +284,6 @@ def plan_recording(
         hanging_source=f"hangs {below:.3f} m below the tips ({by})",
         pull=pull,
         dips=len(dips),
-        design=design,
     )
 
 

@@ -78,7 +78,7 @@ def masked_frames(
     done: Processed, cloud: CloudParams, numbers: list[int] | None = None
 ) -> Iterator[tuple[RgbdFrame, np.ndarray]]:
     """These or all pictures of the window with their masks, by the backend of params.cloud."""
-    mask = masker(cloud.mask, done.view, cloud.sam3)
+    mask = masker(cloud.mask, done.view)
     for _, frame in done.view.frames(numbers):
         yield frame, mask.mask(frame)
 

@@ -1,8 +1,7 @@
-"""What code a result depends on: the folders that a script imports, and a digest of each.
+"""What code a result depends on: the folders that a script imports, and a digest of a folder.
 
 Python's imports are followed at any depth and inside functions too. `tools/closure.py` writes them
-into dvc.yaml; environment.py notes them with every figure, and
-`sling figures` says whether they are still the same.
+into dvc.yaml.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ UNTRACKED = (
     "stages/start.py",
     "stages/dvc_files.py",
 )  # nobody's dependency: see tools/closure.py
-UNCOUNTED = {"pipeline/params", *UNTRACKED[1:]}  # among digests
 NESTED = (  # folders of folders: what lies in them is a concern by itself, be it folder or file
     "pipeline/",
     "pipeline/identify/",
@@ -90,14 +88,6 @@ def concern(file: str) -> str:
         return file
     top = max((name for name in NESTED if file.startswith(name)), key=len, default="")
     return "/".join(file.split("/")[: top.count("/") + 1 if top else 2])
-
-
-def digests(*scripts: Path, root: Path = ROOT) -> dict[str, str]:
-    """A digest of each concern that scripts run, by its path, sorted."""
-    files = {file for script in scripts for file in closure(script, root)}
-    tracked = {concern(file) for file in files if file.startswith(CODE)}
-    tracked -= {*UNCOUNTED, *(f"{top}__init__.py" for top in CODE)}
-    return {name: content for name in sorted(tracked) if (content := digest(root / name))}
 
 
 def digest(part: Path) -> str | None:

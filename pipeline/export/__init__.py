@@ -4,4 +4,4 @@ chain.py is the model that engines without our law can hold; match.py finds its 
 proves them by a replay in that engine; card.py says what came out and what is left.
 """
 
-ENGINES = "mjcf", "newton", "yaml", "usd"  # targets of an export
+ENGINES = "mjcf", "newton", "usd"  # targets of an export

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder, write_json, write_text
 from pipeline.episode.episode import Episode
-from pipeline.export import ENGINES, card, mjcf, newton_file, usd, yaml_file
+from pipeline.export import ENGINES, card, mjcf, newton_file, usd
 from pipeline.export.band import CalibratedBand
 from pipeline.export.chain import SpringChain
 from pipeline.export.match import matched, proof_draws
@@ -73,5 +73,5 @@ def _keys(chain: SpringChain, proof: np.ndarray) -> dict[str, dict[str, np.ndarr
 
 Target = Callable[[CalibratedBand, Path, Episode | None], dict]
 TARGETS: dict[str, Target] = dict(
-    zip(ENGINES, (to_mjcf, newton_file.to_newton, yaml_file.to_yaml, usd.to_usd), strict=True)
+    zip(ENGINES, (to_mjcf, newton_file.to_newton, usd.to_usd), strict=True)
 )

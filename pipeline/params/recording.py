@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, model_validator
+from pydantic import model_validator
 
-from pipeline.base.schema import FILLED, Range, Section, refusal
+from pipeline.base.schema import Range, Section, refusal
 
 Delay = Annotated[float, Range(-4e9, 4e9)]  # s: clocks may be of other epochs
 
@@ -45,22 +44,9 @@ class ForceParams(Section):
         return self
 
 
-def _is_device(text: str) -> str:
-    if not re.fullmatch("cuda(:[0-9]+)?|cpu", text):
-        raise refusal(f"must be cpu, cuda, or one GPU such as cuda:0, got {text!r:.60}")
-    return text
-
-
-class Sam3(Section):
-    weights: Annotated[str, FILLED]
-    prompt: Annotated[str, FILLED]
-    device: Annotated[str, AfterValidator(_is_device)]
-
-
 class CloudParams(Section):
     points: Annotated[int, Range(10, 100_000)]
-    mask: Literal["opencv", "sam3", "folder"]
-    sam3: Sam3
+    mask: Literal["opencv", "folder"]
     statistical_neighbors: Annotated[int, Range(1, 1000)]
     statistical_ratio: Annotated[float, Range(0.1, 100)]
     radius: Annotated[float, Range(1e-4, 1)]

@@ -57,7 +57,7 @@ def clouds_of(view: View, cloud: CloudParams) -> Clouds:
     path = view.recording.path
     if not len(view):
         raise UserError(f"{path}: no camera frames between the window's start and end")
-    mask = masker(cloud.mask, view, cloud.sam3)
+    mask = masker(cloud.mask, view)
 
     def of_frame(number: int) -> list[tuple[float, np.ndarray, int]]:
         """Nothing of a damaged frame."""

@@ -43,7 +43,6 @@ CASES = {
     "add-band --mass": (ADD, ADD.replace("0.04", "0.05")),
     "add-recording --band": (MORE, MORE.replace("mine", "band9")),
     "add-recording recordings": (MORE, MORE.replace("other", "mine")),
-    "drift --band": ("drift --band mine", "drift --band band9"),
     "check recording": ("check mine.mcap", "check other.mcap"),
     "setup --max-force": ("setup --max-force 25", "setup --max-force 26"),
     "plan --band": (PLAN, "plan --band band2"),
@@ -55,10 +54,9 @@ CASES = {
     "observe --draw": (OBSERVE, OBSERVE.replace("0.30", "0.31")),
     "observe --landing": (OBSERVE, OBSERVE.replace("2.3", "2.4")),
     "export --band": (EXPORT, EXPORT.replace("mine", "band2")),
-    "export --to": (EXPORT, EXPORT.replace("mjcf", "yaml")),
+    "export --to": (EXPORT, EXPORT.replace("mjcf", "usd")),
     "remove-band name": ("remove-band mine --yes", "remove-band band1 --yes"),
     "reset keys": ("reset", "reset setup.tips"),
-    "bench --methods": ("bench --methods de", "bench --methods bo"),
     "--version": ("flow", "--version"),
 }
 # Command lines, and options that each is tried without and with.
@@ -66,7 +64,6 @@ ADDED = {
     "fit --name mine": "--mass 0.05, --diameter 0.011, --rest-length 0.5, --launches launches.csv,"
     " --json",
     ADD: "--diameter 0.011, --rest-length 0.5",
-    "drift --band mine": "--json",
     "check mine.mcap": "--band band2, --rest-length 0.5, --pull 2, --sheet sheet.txt,"
     " --rrd line.txt, --pictures data, --frames, --json",
     "check mine.mcap --band mine": "--diameter 0.02",
@@ -86,9 +83,7 @@ ADDED = {
     "flow": "--workers 2, --gpus 2, --cluster nowhere",
     "ui": "--port 4300",
     "verify": "--device cuda:0",
-    "bench --methods de": "--device cuda:0, --scaling mine, --peers, --recording mine.mcap,"
-    " --budget large, --law rubber, --json",
-    "figures": "--json",
+    "bench": "--device cuda:0, --law rubber, --json",
 }
 CASES |= {
     f"{line.split()[0]} {option.split()[0].partition('=')[0]}": (line, f"{line} {option}")
@@ -182,10 +177,6 @@ def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
         message.to_json = lambda frames: json.dumps([repr(given[2:]), frames])
         return Look(message)
 
-    def bench(arguments: argparse.Namespace, what: str) -> str:
-        given = vars(arguments).items()
-        return summary(what, *(pair for pair in given if pair[0] not in ("command", "refuse")))
-
     def summary(*given, **more) -> str:
         requested.append((*map(str, given), sorted(map(str, more.items()))))
         return "done"
@@ -194,8 +185,6 @@ def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
     patch.setattr("app.fit.fit.stages_of", lambda root: {})
     patch.setattr("app.preflight.recordings.checked", lambda *given: [])
     patch.setattr("app.preflight.command.look_at", look_at)
-    patch.setattr("app.drift.drift.drift", lambda settings, band: {"band": summary(band)})
-    patch.setattr("app.drift.drift.shown", str)
     patch.setattr("app.export.export_of_run", lambda _, *what: (summary(*what), {"what": 1}))
     patch.setattr("app.export.shown", lambda folder, card: "in words")
     patch.setattr("app.reset._committed", lambda path: DEFAULTS.read_text("utf-8"))
@@ -205,8 +194,11 @@ def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
         "validation.simulator.verification.verify", lambda _, device, extra: summary(device)
     )
     patch.setattr("validation.simulator.verification.summary", lambda done: (done, 0))
-    patch.setattr("validation.benchmarks.bench.bench", bench)
-    patch.setattr("validation.figures.listed", lambda *given: [])
+    patch.setattr("pipeline.base.environment.environment", lambda *given: {"given": given})
+    patch.setattr(
+        "validation.benchmarks.throughput.bench", lambda _, *what: {"bench": summary(*what)}
+    )
+    patch.setattr("validation.benchmarks.throughput.table", str)
 
 
 def once(outcomes: dict[str, tuple], outcome: Callable[[str], tuple], line: str) -> tuple:

@@ -38,7 +38,6 @@ def put(root: Path, band: str) -> list[Path]:
         layout.measured / f"{band}.csv",
         layout.plans(band) / "trajectory.csv",
         layout.card(band) / "card.json",
-        root / "reports" / "drift" / f"{band}.png",
         root / ".checkpoints" / band / "cache",
         root / ".checkpoints" / f"{band}-unmounted" / "cache",
     ]

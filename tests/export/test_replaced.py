@@ -6,19 +6,19 @@ import pytest
 
 from pipeline.export.export import replaceable
 
-CARD = {"target": "yaml", "files": {"band.yaml": "values", "README.md": "how to use it"}}
+CARD = {"target": "usd", "files": {"band.usda": "the band", "README.md": "how to use it"}}
 
 
 @pytest.mark.parametrize(
     ("files", "card", "may"),
     [
         ((), None, True),
-        (("band.yaml", "README.md"), CARD, True),
-        (("band.yaml", "README.md", "mine.txt"), CARD, False),
+        (("band.usda", "README.md"), CARD, True),
+        (("band.usda", "README.md", "mine.txt"), CARD, False),
         (("policy.onnx",), {"band": "band1", "training": {}}, False),  # a policy's
         (("README.md", "force.png"), {"band": "band1", "verdict": "no"}, False),  # a band's
-        (("band.yaml",), None, False),
-        (("band.yaml",), [], False),
+        (("band.usda",), None, False),
+        (("band.usda",), [], False),
     ],
 )
 def test_only_an_export_is_replaced(tmp_path, files, card, may) -> None:

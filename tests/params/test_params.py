@@ -178,7 +178,6 @@ REFUSED = [
     ("bands.band1.rest_length", 0.2, "bands.band1.rest_length: 0.2 must be longer than setup."),
     ("policy.hidden", [], "policy.hidden: must not be empty"),
     ("loss", 3, "loss: must be a mapping"),
-    ("cloud.sam3.device", "gpu", "cloud.sam3.device: must be cpu, cuda, or one GPU such as cuda:0"),
     ("weather", 3, "weather: unknown key"),
     ("methods.de.weights", NOTHING, "methods.de.weights: at least one weight"),
     ("methods.de.search", "cmaes", "methods.de.search: must be multistart, least_squares, de"),

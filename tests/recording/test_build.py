@@ -93,11 +93,6 @@ def test_bytes_are_reproducible_and_come_back(episode, seen, params, tmp_path) -
     assert back.metadata["input"]["topics"]["wrench"] == "/ft/wrench"
 
 
-def test_an_unknown_mask_is_refused_by_name(seen, params) -> None:
-    with pytest.raises(UserError, match="sam3"):
-        build_episodes(seen[0], "band1", with_(params, "cloud", mask="sam3"))
-
-
 def test_a_late_camera_is_put_right_and_it_is_said(episode, seen, params) -> None:
     recording = read_recording(seen[0], params.setup).shifted(camera=-0.015)
     done = process_pull(Pull.of(recording, params.setup), params.bands["band1"], params)

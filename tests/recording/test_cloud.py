@@ -11,9 +11,7 @@ from scipy.spatial import cKDTree
 from pipeline.base.errors import UserError
 from pipeline.params import load
 from pipeline.recording import cloud
-from pipeline.recording.masks import masker
 from tests.project import DEFAULTS
-from validation.benchmarks import clouds as bench
 from validation.recordings import looks
 from validation.recordings.looks import BAND, LOOKS
 
@@ -95,12 +93,6 @@ def test_a_recording_in_which_no_band_is_seen_is_refused(monkeypatch) -> None:
         cloud.clouds_of(view, SETTINGS)
 
 
-def test_a_backend_that_is_not_there() -> None:
-    view, _ = looks.view_of(LOOKS["orange on grey, white arm"], looks.times(4))
-    with pytest.raises(UserError, match="'other' is not available"):
-        masker("other", view, SETTINGS.sam3)
-
-
 def test_colours_of_a_camera_apart_belong_to_their_points() -> None:
     """What the colour camera does not see is black; it never takes the colour of what hides it."""
     look = LOOKS["orange, colour camera apart"]
@@ -120,13 +112,3 @@ def test_colours_of_a_camera_apart_belong_to_their_points() -> None:
         assert (frame.pixels[black & (frame.depth > 0)] == -1).mean() > 0.9
     assert np.mean(orange) > 0.9
     assert 0 < hidden < 0.2 * there
-
-
-def test_the_steps_are_timed(seen, params) -> None:
-    result = bench.bench_recording(seen[0], params)
-    assert result["frames"] == 54 and result["points"] > 100
-    assert set(result["per_frame_ms"]) == set(bench.STEPS)
-    assert all(value > 0 for value in result["per_frame_ms"].values())
-    rest = sum(value for step, value in result["per_frame_ms"].items() if step != "decode")
-    assert result["frames_per_s_after_decoding"] == pytest.approx(1000 / rest)
-    assert "after decoding" in bench.table(result)

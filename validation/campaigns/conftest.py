@@ -33,14 +33,11 @@ def progress(capsys) -> Callable[[str], None]:
 
 @pytest.fixture
 def record(request) -> Callable[..., None]:
-    """Write reports/validation/<name>.json.
-
-    `code` in it has digests of what the campaign imports: `sling figures` tells which are older.
-    """
+    """Write reports/validation/<name>.json."""
 
     def write(name: str, *, requested: str, met: bool, settings: dict, figures: dict) -> None:
         content = {"asked": requested, "met": met, "settings": settings, "figures": figures}
-        content |= environment("cpu", "make validate", request.path)
+        content |= environment("cpu", "make validate")
         alone = f"python -m pytest -m validation -n 0 validation/campaigns/{request.path.name}"
         path = ROOT / "reports/validation" / f"{name}.json"
         write_json(path, plain(content | {"alone": alone}, digits=5))

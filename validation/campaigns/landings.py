@@ -51,7 +51,7 @@ from validation.reports import plain, write_report
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
 WORK, PULLS = Path(".checkpoints/landings"), ("paper", "informative")
-ONE_DIP = "one_dip"  # instead of plan.dips, which validation/campaigns/pulls.py has searched
+ONE_DIP = "one_dip"  # instead of plan.dips, which reports/validation/pulls.json has
 DIPS = Path("reports/validation/pulls.json")
 PAGE, README, BLOCK = Path("docs/identification.md"), Path("README.md"), "landings"
 OTHERWISE: tuple[tuple[str, dict], ...] = (  # how the first recording of a band is identified too

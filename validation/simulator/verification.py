@@ -5,7 +5,6 @@ Another device than the CPU has pages of its own, such as reports/simulator-cuda
 
 from __future__ import annotations
 
-import inspect
 import math
 import os
 import tempfile
@@ -104,9 +103,8 @@ def verify(
         for picture in sorted(Path(figures).glob("*.png")):
             with replacing(root / "reports" / name / picture.name) as temporary:
                 temporary.write_bytes(picture.read_bytes())
-    scripts = [Path(inspect.getfile(function)) for function in (verify, *(extra or {}).values())]
-    provenance = environment(device, f"sling verify --device {device}", *scripts)
-    retained = ("device", "simulator", "code") + (() if device == "cpu" else ("device_name",))
+    provenance = environment(device, f"sling verify --device {device}")
+    retained = ("device",) + (() if device == "cpu" else ("device_name",))
     context = {name: provenance[name] for name in retained}
     write_text(root / f"reports/{name}.md", markdown(sections, context, name))
     write_json(root / f"reports/{name}.json", context | {"sections": list(map(_entry, sections))})

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from ruamel.yaml import YAML
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
@@ -286,32 +285,7 @@ def test_the_informative_pull_is_the_default(params, tmp_path) -> None:
     assert plan.held_time == pytest.approx(paper.held_time + 4.0, abs=1e-6)
     assert "informative, with 2 dips" in plan.to_text([])
     assert "paper, with 0 dips" in paper.to_text([])
-    assert len(plan.write(tmp_path, 100.0)) == 4  # and no design.png
-
-
-def test_a_designed_pull_says_what_it_is_worth(params, tmp_path, monkeypatch) -> None:
-    """Three bands, one dip, little refinement: the real search takes a minute."""
-    from pipeline.identify.posterior import design
-
-    monkeypatch.setattr(design, "DRAWS", 3)
-    monkeypatch.setattr(design, "MOST_DIPS", 1)
-    monkeypatch.setattr(design, "REFINED", 6)
-    progress = []
-    plan = plan_recording(params, "band1", pull="designed", progress=progress.append)
-    assert plan.dips == 1 and progress[0].startswith("pull 1: 0 dips, ±")
-    widths = plan.content()["design"]["half_width_m"]
-    assert widths["paper"] == widths["plan.dips"]  # which are none here
-    assert all(a > 1.5 * b for a, b in zip(widths["paper"], widths["designed"], strict=True))
-    text = plan.to_text(plan.write(tmp_path, 100.0))
-    assert (tmp_path / "design.png").stat().st_size > 10_000
-    pasted = "plan:\n" + text[text.index("  dips:") : text.index("\n\nwrote")]
-    (dip_fields,) = YAML(typ="safe").load(pasted)["plan"]["dips"]
-    again = plan_recording(with_(params, "plan", dips=(Dip(**dip_fields),)), "band1")
-    np.testing.assert_array_equal(again.trajectory.path.c, plan.trajectory.path.c)
-
-    other = {name: method for name, method in params.methods.items() if name != "least_squares"}
-    with pytest.raises(UserError, match="no method has search: least_squares and law: rubber"):
-        plan_recording(with_(params, "", methods=other), "band1", pull="designed")
+    assert len(plan.write(tmp_path, 100.0)) == 4
 
 
 def test_speed_and_acceleration_of_any_trajectory(params) -> None:

@@ -4,8 +4,8 @@
 
 Reads params.yaml alone and writes data/floor/<band>.json. A coarse map of launches without errors
 says where in the box a target is met, and least sensitively; a root search on the rig ends on it. A
-target that is out of reach has no draw, and no launch at it lands. How far the band
-truly hangs with a weight (base/weight.py) stands there too. Only the report may read them.
+target that is out of reach has no draw, and no launch at it lands. Only the report may
+read it.
 """
 
 from __future__ import annotations
@@ -15,13 +15,9 @@ import sys
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
-from pipeline.base.weight import READINGS, tension
-from rig.draw import sampled
 from rig.oracle.aim import least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
-from rig.oracle.hanging import hanging_stretch
 from rig.oracle.world import World
-from rig.physics.world import string_of
 from stages.start import run, started
 
 
@@ -42,7 +38,6 @@ def main() -> None:
                 " setup.max_force, widen setup.draw_y and setup.draw_z, or move trials.targets",
                 file=sys.stderr,
             )
-    string = string_of(sampled(params, band, launching=True), band)
     content = {
         "band": band,
         "kind": "virtual",
@@ -50,7 +45,6 @@ def main() -> None:
         "actuation_error_m": params.trials.actuation_error,
         "release_jitter": params.rig.release_jitter,
         "seed": params.trials.seed,
-        "hanging_stretch": {str(n): hanging_stretch(string, tension(n)) for n in READINGS},
     }
     write_json(Layout().floor(band), content)
     mean, landed = floor["mean_error_m"], floor["launches"] - floor["failed"]

@@ -20,7 +20,7 @@ def shown(card: dict) -> str:
     if card["next"]:
         lines += ["", "What would help most:", *(f"  - {step}" for step in card["next"])]
     page = Path(card["card"]).with_name("index.html").resolve()
-    return "\n".join([*lines, "", f"Card: {card['card']}", f"Page with a replay: {page.as_uri()}"])
+    return "\n".join([*lines, "", f"Card: {card['card']}", f"Page: {page.as_uri()}"])
 
 
 def _value(row: dict) -> str:

@@ -44,7 +44,7 @@ class Pictures:
             NotMade: It is not there.
             UserError: It cannot be read, or an older version made the episode.
         """
-        if not path.is_file():
+        if not path.exists():
             raise NotMade(path)
         geometry = EpisodeGeometry.of_episode(episode.metadata, episode.band)
         late = _applied(episode, "camera")

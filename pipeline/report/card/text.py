@@ -56,9 +56,9 @@ def card_text(
     shown: list[ShownValue],
     steps: list[str],
     *,
-    animated: bool = True,
+    linked: bool = True,
 ) -> str:
-    """README.md of a card; without the animation where a replay takes its place."""
+    """README.md of a card; without links to other files where it is to stand alone."""
     aims, launches = inputs.aims, len(inputs.confidence.get("launches", []))
     draws = aims.target, aims.draw, aims.landing, aims.failure, aims.interval, aims.hold_force
     tried = sorted(inputs.launched.kind.value_counts().items())
@@ -69,7 +69,7 @@ def card_text(
         title=SAID[verdict],
         reasons=reasons,
         rig=inputs.params.bands[inputs.band].source == "rig",
-        animated=animated,
+        linked=linked,
         glossary=GLOSSARY,
         shown=shown,
         draws=zip(*draws, strict=True),

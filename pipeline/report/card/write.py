@@ -17,11 +17,11 @@ from pipeline.report.card.camera import Pictures
 from pipeline.report.card.findings import findings
 from pipeline.report.card.inputs import CardInputs, card_inputs
 from pipeline.report.card.next_steps import next_steps
-from pipeline.report.card.page import flights_at, write_page
 from pipeline.report.card.simulated import simulate
 from pipeline.report.card.text import card_text, reasons_of
 from pipeline.report.card.values import boxes, values
 from pipeline.report.card.verdict import judge, question
+from pipeline.report.drawing.page import page
 
 
 def write(params: Params, band: str, method: str, root: str | Path = ".") -> dict:
@@ -57,9 +57,8 @@ def write(params: Params, band: str, method: str, root: str | Path = ".") -> dic
         animate(folder / "animation.webp", episode, simulated, pictures, setup.fork_width)
         write_text(folder / "README.md", card_text(*text))
         write_json(folder / "card.json", card)
-        page = card_text(*text, animated=False)
-        launches = flights_at(inputs.trials, aims)
-        write_page(folder, page, f"{band}: {verdict}", episode, simulated, setup, launches)
+        alone = page(card_text(*text, linked=False), folder, f"{band}: {verdict}")
+        write_text(folder / "index.html", alone)
     return card
 
 

@@ -22,31 +22,24 @@ def page(
     folder: Path,
     title: str,
     *,
-    section: str = "",
-    links: tuple[tuple[str, str], ...] = (),
     foot: str = "",
 ) -> str:
     """The page as HTML.
 
     Args:
         folder: Where the text's pictures lie.
-        section: HTML that stands before the first chapter.
-        links: Ids and titles of chapters in `section`; their links come first.
         foot: HTML at the end.
 
     Raises:
         UserError: A picture is missing.
     """
     body, chapters = _rendered(markdown, folder)
-    begin = next((match.start() for match in re.finditer("<h2 ", body)), len(body))
     return filled(
         HERE / "page.html.j2",
         title=title,
         style=(HERE / "page.css").read_text("utf-8"),
-        navigation="\n".join(f'<a href="#{id_}">{name}</a>' for id_, name in (*links, *chapters)),
-        first=body[:begin],
-        section=section,
-        rest=body[begin:],
+        navigation="\n".join(f'<a href="#{id_}">{name}</a>' for id_, name in chapters),
+        body=body,
         foot=foot,
     )
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from pipeline.launching.surface.stored import Stored
 from pipeline.params import Params
@@ -14,8 +13,6 @@ from pipeline.report.drawing.canvas import P, Saving
 from pipeline.report.drawing.styles import Styles, drawn, styles
 from pipeline.report.run.landscape import Landscape, landscape
 from pipeline.report.run.paper import METHOD
-from pipeline.report.run.physx import launched
-from pipeline.report.run.repeated import Repeated
 from pipeline.report.run.replay import MethodReplay, replay_method
 from pipeline.report.run.results import Result, Results, gather
 
@@ -28,8 +25,6 @@ class Report:
         replays: By band and method; of the methods that are drawn, of all where data are held out.
         styles: By method.
         landscape: Of the first search that refines regions, with its result, where one did.
-        repeated: The campaign on more recordings of the rig, where its bands ran.
-        in_physx: Launches by the paper's method in the paper's engine, by band of the rig.
         root: Of the project, with data/ and reports/.
     """
 
@@ -38,8 +33,6 @@ class Report:
     replays: dict[str, dict[str, MethodReplay]]
     styles: Styles
     landscape: tuple[Result, Landscape] | None
-    repeated: Repeated | None
-    in_physx: dict[str, pd.DataFrame]
     root: Path
 
     @classmethod
@@ -48,14 +41,12 @@ class Report:
         results = gather(params, root)
         named = styles(dict.fromkeys(result.method for result in results))
         replays = {band: _replays(params, results, band) for band in params.run.bands}
-        repeated = Repeated.load(root) if results.floors else None
         searched = next((result for result in results if result.regions), None)
         chart = searched and (
             searched,
             landscape(params, searched, results.episodes[searched.band]),
         )
-        in_physx = launched(root, results.floors)
-        return cls(params, results, replays, named, chart, repeated, in_physx, root)
+        return cls(params, results, replays, named, chart, root)
 
     @property
     def folder(self) -> Path:

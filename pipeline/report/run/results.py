@@ -33,7 +33,6 @@ class Floor(FloorOfTarget):
     actuation_error_m: float
     release_jitter: float
     targets: dict[str, FloorOfTarget]
-    hanging_stretch: dict[str, float | None] = {}  # by strands (base/weight.py)
 
 
 @dataclass(frozen=True)

@@ -203,9 +203,7 @@ def test_the_screen() -> None:
     )
     assert any("fails in simulation" in line for line in lines)
     assert lines[-2] == "Card: reports/bands/mine/README.md" and len(lines) < 25
-    page = re.fullmatch(
-        r"Page with a replay: file://(/.*/reports/bands/mine/index\.html)", lines[-1]
-    )
+    page = re.fullmatch(r"Page: file://(/.*/reports/bands/mine/index\.html)", lines[-1])
     assert page
 
 

@@ -17,6 +17,7 @@ from pipeline.recording.input.reader import read_recording
 from pipeline.report.card.camera import Pictures
 from pipeline.report.card.camera_view import CameraView
 from pipeline.report.card.simulated import Simulated, simulate
+from tests.recording.split import split
 from tests.report.card.conftest import BAND, METHOD, TRUTH
 
 
@@ -79,6 +80,14 @@ def test_the_latest_picture(pictures) -> None:
     assert pictures.latest(-5.0) == 0
     for number in (0, 7, len(pictures.time) - 1):
         assert pictures.latest(pictures.time[number] + 1e-6) == number
+
+
+def test_the_parts_of_a_split_bag_are_one_recording(pictures, summary, project, tmp_path) -> None:
+    split(Layout(project).raw(BAND) / "seen.mcap", tmp_path / "seen", cuts=(1.5,))
+    parts = Pictures.of(tmp_path / "seen", summary.episode, summary.params.setup)
+    np.testing.assert_array_equal(parts.time, pictures.time)
+    for number in (0, len(parts.time) - 1):
+        np.testing.assert_array_equal(parts[number], pictures[number])
 
 
 def test_a_missing_recording_is_named(summary, tmp_path) -> None:

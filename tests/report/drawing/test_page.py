@@ -31,9 +31,7 @@ PICTURE = b"\x89PNG of bytes"
 def html(tmp_path: Path) -> str:
     (tmp_path / "figures").mkdir()
     (tmp_path / "figures" / "one.png").write_bytes(PICTURE)
-    section = '<h2 id="between">Between</h2>'
-    links = (("between", "Between"),)
-    return page(MARKDOWN, tmp_path, "A title", section=section, links=links, foot="<p>last</p>")
+    return page(MARKDOWN, tmp_path, "A title", foot="<p>last</p>")
 
 
 def test_the_text_is_in_the_page_with_its_pictures(html: str) -> None:
@@ -46,7 +44,7 @@ def test_the_text_is_in_the_page_with_its_pictures(html: str) -> None:
         ("chapter-2-band-more", "Band &amp; more"),
     ):
         assert f'<a href="#{name}">{title}</a>' in html and f'<h2 id="{name}">{title}</h2>' in html
-    order = ("Before.", 'id="between"', 'id="chapter-1', 'id="chapter-2', "<p>last</p>")
+    order = ("Before.", 'id="chapter-1', 'id="chapter-2', "<p>last</p>")
     places = [html.index(text) for text in order]
     assert places == sorted(places)
 

@@ -37,7 +37,6 @@ def test_a_band_of_the_rig_has_a_floor(root, params) -> None:
     floor = {
         "band": BAND, "mean_error_m": 0.02, "launches": 5, "actuation_error_m": 1e-3,
         "release_jitter": 0.02, "targets": {"1.725": {"mean_error_m": 0.02}},
-            "hanging_stretch": {"2": 1.7, "1": None},
     }  # fmt: skip
     (root / "data" / "floor" / f"{BAND}.json").write_text(json.dumps(floor))
     assert gather(virtual, root).floors == {BAND: floor}

@@ -88,7 +88,7 @@ def test_the_report_is_complete_and_equal_in_another_process(root, params) -> No
     assert page.count('src="data:image/png;base64,') == len(pictures)
     for title in re.findall("^## (.*)$", text, re.MULTILINE):
         assert f">{title}</h2>" in page
-    tables = {f"table{number}.{kind}" for number in (1, 2) for kind in ("csv", "tex")}
+    tables = {f"table{number}.csv" for number in (1, 2)}
     assert tables == {file.name for file in first if file.parent.name == "tables"}
     assert "3.00 ± 0.71" in text  # |miss| 2 and 3 cm, then 4 cm; one target has a deviation
     assert "1 of 4" in text
@@ -112,8 +112,6 @@ def test_a_run_of_three_bands_is_told_in_few_words_and_pictures(root, params, te
     assert re.findall("^## (.*)$", summary, re.MULTILINE) == chapters
     assert [f"### Table {n}\n" in summary for n in (1, 2, 3, 4)] == [True] * 4
     assert "not run" not in text and text.count(".png") <= 15
-    sentences = [line for line in summary.splitlines() if line.startswith("- ") and "⚠" not in line]
-    assert len([line for line in sentences if "](bands/" not in line]) <= 8
     assert "[band2](bands/band2/README.md)" in summary and "| band3 | 4 virtual | 3.0 |" in summary
 
 

@@ -46,7 +46,6 @@ def test_a_floor_is_outcomes_by_its_name(tmp_path, params) -> None:
     misses = np.zeros((len(params.trials.targets), 6))
     floor = errors_of(misses[:, :2], misses + np.array(params.trials.targets)[:, None], params)
     content = {**floor, "band": "band1", "actuation_error_m": 1e-3, "release_jitter": 0.02}
-    content["hanging_stretch"] = {"2": 1.7, "1": None}
     path.write_text(json.dumps(content))
     assert load_floor(path) == content
     out_of_reach = misses[:, :2] * np.nan

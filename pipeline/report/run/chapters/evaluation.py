@@ -1,4 +1,4 @@
-"""What the paper's evaluation has besides its tables: bullseye, sensitivity, its four figures."""
+"""What the paper's evaluation has besides its tables: bullseye, its figures 1, 2 and 4."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from pipeline.base.template import filled
 from pipeline.report.drawing.styles import Styles
 from pipeline.report.run import paper
 from pipeline.report.run.figures.flights import flights
-from pipeline.report.run.figures.hanging import hanging
 from pipeline.report.run.figures.method import method
 from pipeline.report.run.figures.overview import overview
 from pipeline.report.run.report import Report
@@ -19,39 +18,33 @@ from pipeline.report.run.tables import evaluation as tables
 from pipeline.report.run.tables.cells import markdown
 from pipeline.report.run.tables.landings import LAUNCHED, of_kind
 
-TARGETS = 101  # between the policies' nearest and farthest, at which a landing's slope is taken
+TARGETS = 101  # of the policy's path that is drawn, from the nearest to the farthest
 
 
 def evaluation(report: Report) -> str:
     """The chapter, as far as its parts ran."""
-    params, results, styles = report.params, report.results, report.styles
+    results, styles = report.results, report.styles
     shown = report.shown({report.main, *paper.BENCHMARK})  # as in the paper's figures, ours first
-    path = np.linspace(*params.policy.targets, TARGETS)
-    draws = {(r.band, r.method): report.draws(r, path) for r in results if r.method in shown}
     hits = tables.bullseye(results, styles)
-    lengths = tables.hanging(params, results, tuple(shown)) if results.floors else None
-    hung = tables.hanging_table(lengths, styles) if lengths else None
-    alt = "bands that hang with a weight"
     return filled(
         Path(__file__).with_name("evaluation.md.j2"),
-        overview=_overview(report, draws),
+        overview=_overview(report),
         search=_search(report),
         hits=markdown(hits, repeats=False),
         flights=hits and _flights(report, shown),
-        sensitivity=markdown(tables.sensitivity(results, draws, styles), repeats=False),
-        lengths=markdown(hung, repeats=False),
-        hanging=lengths and report.picture("hanging", alt, hanging, lengths, styles),
     )
 
 
-def _overview(report: Report, draws: dict[tuple[str, str], np.ndarray]) -> str | None:
+def _overview(report: Report) -> str | None:
     band, methods = next(iter(report.results.methods.items()))
     trials = of_kind(methods[report.main].trials, *LAUNCHED)
     trials = trials.loc[trials.target.notna()]
     if trials.empty:
         return None
     drawing = report.results.episodes[band], report.replays[band][report.main]
-    drawing = overview, *drawing, draws[band, report.main], trials, report.styles[report.main]
+    targets = np.linspace(*report.params.policy.targets, TARGETS)
+    draws = report.draws(methods[report.main], targets)
+    drawing = overview, *drawing, draws, trials, report.styles[report.main]
     return report.picture("overview", "from a recording to launches", *drawing)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +23,6 @@ from pipeline.report.run.tables.landings import (
 
 PAPER = "paper, real robot"
 FLOOR, ORACLE = "actuation floor", "virtual, oracle"
-IN_PHYSX = "Sling2Sim2Real in PhysX"
 APART = {*paper.OPTIMISERS, *paper.ABLATIONS} - set(paper.BENCHMARK)  # tables 3 and 4 hold these
 
 
@@ -33,7 +32,7 @@ class Row:
 
     Attributes:
         band: As in params.yaml.
-        method: As in params.yaml, IN_PHYSX or FLOOR.
+        method: As in params.yaml, or FLOOR.
         source: "virtual", "measured", PAPER or ORACLE.
         errors: By target, and of "all".
     """
@@ -50,17 +49,11 @@ def ordered(methods: Iterable[str]) -> list[str]:
     return list(dict.fromkeys([*theirs, *sorted(methods, key=APART.__contains__)]))
 
 
-def benchmark(results: Results, in_physx: Mapping[str, pd.DataFrame] | None = None) -> list[Row]:
-    """Table 1: every method that stands in no other table, on every band that it launched on.
-
-    Args:
-        in_physx: Launches by the paper's method in the paper's engine, by band.
-    """
+def benchmark(results: Results) -> list[Row]:
+    """Table 1: every method that stands in no other table, on every band that it launched on."""
     rows = []
     for band, ran in results.methods.items():
         rows += _rows(results, band, (method for method in ordered(ran) if method not in APART))
-        if in_physx and band in in_physx:
-            rows.append(Row(band, IN_PHYSX, "virtual", landing_errors(in_physx[band])))
         if band in results.floors:
             rows.append(Row(band, FLOOR, ORACLE, _floor(results.floors[band])))
     return rows
@@ -162,7 +155,7 @@ def band_name(band: str) -> str:
 
 def method_name(method: str, styles: Styles) -> str:
     """Name of a method for readers."""
-    return method if method in (FLOOR, IN_PHYSX) else styles[method].name
+    return method if method == FLOOR else styles[method].name
 
 
 def records(rows: list[Row]) -> pd.DataFrame:

@@ -20,16 +20,16 @@ NAMED = styles(["least_squares", "package_si", "de", "no_work"])
 
 @pytest.fixture
 def written(tmp_path):
-    def run(*some, floors=None, in_physx=None) -> str:
-        ran, beside = results(*some, floors=floors), {"repeated": None, "in_physx": in_physx or {}}
+    def run(*some, floors=None) -> str:
+        ran = results(*some, floors=floors)
         return paper_tables(
-            SimpleNamespace(params=PARAMS, results=ran, styles=NAMED, folder=tmp_path, **beside)
+            SimpleNamespace(params=PARAMS, results=ran, styles=NAMED, folder=tmp_path)
         )
 
     return run
 
 
-def test_every_table_is_there_in_each_form(written, tmp_path) -> None:
+def test_every_table_is_there_and_on_file(written, tmp_path) -> None:
     ours = launches(0.05 + NOISE)
     ran = (
         result("band1", "least_squares", ours),
@@ -43,15 +43,12 @@ def test_every_table_is_there_in_each_form(written, tmp_path) -> None:
     assert tables == [f"Table {number}" for number in (1, 2, 3, 4)]
     links = re.findall(r"\]\((tables/.*?)\)", text)
     files = {file.relative_to(tmp_path).as_posix() for file in (tmp_path / "tables").iterdir()}
-    assert set(links) == files and len(links) == 8
+    assert set(links) == files and len(links) == 4
     assert all(len(pd.read_csv(tmp_path / name)) for name in files if name.endswith("csv"))
-    assert "*Actuation floor*" in text and "PhysX" not in text
+    assert "*Actuation floor*" in text
     first = {name: (tmp_path / name).read_bytes() for name in files}
     assert written(*ran, floors=floors) == text
     assert {name: (tmp_path / name).read_bytes() for name in files} == first
-    text = written(*ran, floors=floors, in_physx={"band1": launches(0.3 + NOISE)})
-    assert "Sling2Sim2Real in PhysX" in text
-    assert "[band1](validation/physx-policy-band1.json)" in text
 
 
 def test_nothing_is_said_of_what_did_not_run(written, tmp_path) -> None:
@@ -59,7 +56,7 @@ def test_nothing_is_said_of_what_did_not_run(written, tmp_path) -> None:
     text = written(result("band3", "package_si", nothing, confidence={}))
     assert re.findall("^### (.*)$", text, re.MULTILINE) == ["Table 2"]
     assert "Actuation floor" not in text and "90 %" not in text and "not run" not in text
-    assert {file.name for file in (tmp_path / "tables").iterdir()} == {"table2.csv", "table2.tex"}
+    assert {file.name for file in (tmp_path / "tables").iterdir()} == {"table2.csv"}
 
 
 def test_an_optimum_at_a_side_of_its_box_is_marked(written) -> None:

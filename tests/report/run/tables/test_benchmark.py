@@ -9,7 +9,6 @@ import pytest
 from pipeline.report.drawing.styles import styles
 from pipeline.report.run import paper
 from pipeline.report.run.tables.benchmark import (
-    IN_PHYSX,
     ablation,
     as_table,
     benchmark,
@@ -54,14 +53,6 @@ def test_the_papers_rows_stand_below_those_that_ran_in_its_order() -> None:
     assert theirs[4:] == ["–", "–"]
     table = lines(benchmark(ran({"band3 package_si": CLOSE})))
     assert table["Band 3 (stiff)", "Package SI", "paper, real robot"][:4] == ["N/A"] * 4
-
-
-def test_the_papers_method_in_the_papers_engine_has_a_row_of_its_own() -> None:
-    rows = benchmark(ran({"band1 sling2sim2real": CLOSE}), {"band1": FAR, "band2": FAR})
-    table = lines(rows)
-    assert [row.band for row in rows if row.method == IN_PHYSX] == ["band1"]
-    assert table["Band 1 (soft)", IN_PHYSX, "virtual"][0] == "10.00 ± 0.00"
-    assert table["Band 1 (soft)", "Sling2Sim2Real", "virtual"][0] == "**2.00 ± 1.41**"
 
 
 def test_partial_failures_are_counted_and_total_ones_are_not_available() -> None:

@@ -88,18 +88,9 @@ class ParameterBoxes(Section):
     damping_scale: Box[DampingScale]
 
 
-class HeldOut(Section):
-    """Blocks of the recording that are kept out of the fit, to check it."""
-
-    blocks: Annotated[int, Range(0, 20)]
-    length: Annotated[float, Range(0.5, 5)]  # s
-
-
 class LossParams(Section):
-    chamfer: Literal["symmetric", "measured", "clouds"]
+    chamfer: Literal["symmetric", "clouds"]
     median_window: Annotated[int, Range(1, 101)]
-    late_decay: Annotated[float, Range(1e-3, 100)] | None  # 1/sample
-    held_out: HeldOut
 
     @model_validator(mode="after")
     def _window_has_a_middle(self) -> LossParams:

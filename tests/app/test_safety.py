@@ -123,11 +123,11 @@ def trained(params, **then) -> dict:
 def test_params_that_changed_since_training_by_key_values_and_cure(params, project) -> None:
     """Of the policy's own settings, and of those of the θ that it was trained with."""
     then = identified(params, **{"loss.median_window": 9})
-    del then["made_with"]["loss.held_out.length"]
+    del then["made_with"]["loss.chamfer"]
     card(project, made_with=trained(params))
     summary = [hazard.what for hazard in of_policy(params, project, then)]
     cure = f"since the policy was trained: `dvc repro {STAGE}` mends it"
-    assert summary[0] == f"params.yaml: loss.held_out.length was not there, is 0.6, {cure}"
+    assert summary[0] == f"params.yaml: loss.chamfer was not there, is symmetric, {cure}"
     assert summary[1] == f"params.yaml: loss.median_window was 9, is 7, {cure}"
     assert len(summary) == 2
     edit(project, "max_force: 30.0", "max_force: 25.0")

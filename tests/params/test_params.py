@@ -212,7 +212,6 @@ REFUSED = [
     ("methods.de.fixed", {"poissons_ratio": 0.2}, "must be between 0.3 and 0.49, got 0.2"),
     ("methods.de.fixed", ALL_FIXED, "methods.de.fixed: names every parameter, so none is left"),
     ("methods.de.bounds", {"poissons_ratio": 0.4}, "bounds.poissons_ratio: must be a list"),
-    ("loss.held_out.length", 0.1, "loss.held_out.length: must be between 0.5 and 5"),
 ]
 
 

@@ -18,9 +18,8 @@ from validation.campaigns.runner import OURS, PAPER
 PRESETS = ROOT / "presets"
 LAST = "plain_bo"  # takes as long as all others
 # The paper's method under other settings, by names of their own. Of the weights, geometry's is most
-# of the loss; late: what the paper's source has commented out.
+# of the loss.
 SETTINGS: dict[str, dict] = {
-    "late": {"loss": {"late_decay": 0.5}},
     "cma_8": {"optimizer": {"cma_population": 8}},
     "cma_32": {"optimizer": {"cma_population": 32}},
     "de_storn": {"optimizer": {"mutation": [0.7, 0.9], "recombination": 0.9}},

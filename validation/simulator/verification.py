@@ -22,7 +22,6 @@ from validation.simulator import (
     agreement,
     at_rest,
     damping,
-    elements,
     energy,
     five_parameters,
     free_motion,
@@ -38,7 +37,7 @@ HEAD = """\
 `sling verify` writes this page: {met} of {limited} limits are kept{missed}. Figures without a \
 limit are stated for what they tell. [{name}.json]({name}.json) keeps figures and environment.
 
-**What is solved.** A band is by default an extensible director rod: each edge has a deformation \
+**What is solved.** A band is an extensible director rod: each edge has a deformation \
 gradient F = [g a b] of its stretch and its section, with the stable neo-Hookean law without its \
 logarithm (Smith, de Goes and Kim 2018), W = μ/2 (|F|² − 3) − μ (J − 1) + λ/2 (J − 1)², J = det F; \
 λ is the first Lamé parameter plus μ, so that E and ν are the small-strain ones. Joints between \
@@ -55,7 +54,6 @@ SECTIONS: dict[str, Callable[..., Theme]] = {
     "free motion": free_motion.section,
     "energy": energy.section,
     "the five parameters": five_parameters.section,
-    "rod and tetrahedra": elements.section,
 }
 CAMPAIGNS = {
     "launches": launching.section,

@@ -53,7 +53,7 @@ def built(params: Params, band: str, raw: Path, folder: Path) -> Episode:
 def calibrated_clamps(params: Params, band: str, episode: Episode, folder: Path) -> None:
     """Keep an episode in `folder`, with its clamps beside it."""
     episode.save(folder / "episode")
-    sling = ClampedBand.of(params.bands[band], params.setup, params.sling, as_rod=True)
+    sling = ClampedBand.of(params.bands[band], params.setup, params.sling)
     clamps = calibrate_clamps(params, sling, episode, workers=1)
     write_json(folder / "mounting.json", vars(clamps))
 

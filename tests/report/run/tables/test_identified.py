@@ -9,7 +9,6 @@ from pipeline.report.drawing.styles import styles
 from pipeline.report.run.tables.cells import markdown
 from pipeline.report.run.tables.identified import (
     derived,
-    held_out,
     losses,
     methods,
     observed,
@@ -18,10 +17,9 @@ from pipeline.report.run.tables.identified import (
 from pipeline.report.run.tables.policies import policies
 from tests.hostile import MARKUP
 from tests.project import with_
-from tests.report.run.conftest import BAND, METHOD, episode
+from tests.report.run.conftest import BAND, METHOD
 from tests.report.run.tables.toy_results import launches, result
 from tests.report.run.tables.toy_results import results as all_of
-from tests.report.run.toy_replay import toy_replay
 
 MAP = {"target_range": {"draws": 9, "mean_error_m": 3e-4, "max_error_m": None}}
 
@@ -114,20 +112,6 @@ def test_a_fit_that_minimises_no_sum_of_terms_has_no_shares(results, params, nam
 def test_a_term_of_another_name_has_a_column_too(results, params, named) -> None:
     results.methods[BAND][METHOD].theta["loss"]["glow"] = 0.7
     assert column(losses(results, params, named), "glow") == ["0.7 (unused)"]
-
-
-def test_held_out_residuals_stand_beside_the_fitted(params) -> None:
-    inputs, named = (params, BAND, METHOD, episode(), {}), styles(["de", METHOD])
-    residuals = {
-        "force": {"fitted": 0.2, "held_out": 0.3},
-        "cloud": {"fitted": 0.5, "held_out": 0.25},
-    }  # one that knows nothing takes nothing from the other
-    replays = {"de": toy_replay(*inputs), METHOD: toy_replay(*inputs, residuals=residuals)}
-    heads, rows = held_out({BAND: replays}, named)
-    unknown, complete = rows
-    assert unknown == [BAND, "DE_L", "0.200", "–", "–", "0.20", "–", "–"]
-    assert complete == [BAND, "Sling2Sim2Real", "0.200", "0.300", "1.50", "0.50", "0.25", "0.50"]
-    assert heads[2:5] == ["force [N], fitted", "force [N], held out", "force [N], ratio"]
 
 
 def card(**training) -> dict:

@@ -45,7 +45,7 @@ edges bend with E I and twist with G J of the round section. Viscous stress is d
 the elastic stress, its shape part times s. Each step, of second order (BDF2), is solved \
 by Newton's method on the whole band.
 
-Device {device}; simulator {simulator}, a digest of pipeline/simulator.
+Device {device}; commit {commit}.
 """
 SECTIONS: dict[str, Callable[..., Theme]] = {
     "at rest": at_rest.section,
@@ -104,7 +104,7 @@ def verify(
             with replacing(root / "reports" / name / picture.name) as temporary:
                 temporary.write_bytes(picture.read_bytes())
     provenance = environment(device, f"sling verify --device {device}")
-    retained = ("device",) + (() if device == "cpu" else ("device_name",))
+    retained = ("device", "commit") + (() if device == "cpu" else ("device_name",))
     context = {name: provenance[name] for name in retained}
     write_text(root / f"reports/{name}.md", markdown(sections, context, name))
     write_json(root / f"reports/{name}.json", context | {"sections": list(map(_entry, sections))})
@@ -134,7 +134,7 @@ def markdown(sections: list[Theme], context: dict, name: str) -> str:
         missed=f", {missed} not" if missed else "",
         name=name,
         device=", ".join(filter(None, (context["device"], context.get("device_name")))),
-        simulator=context["simulator"],
+        commit=context["commit"],
     )
     return "\n".join([head, *(_part(section, name) for section in sections)])
 

@@ -43,7 +43,7 @@ edges bend with E I and twist with G J of the round section. Viscous stress is d
 the elastic stress, its shape part times s. Each step, of second order (BDF2), is solved \
 by Newton's method on the whole band.
 
-Device {device}.
+Device {device}; commit {commit}.
 """
 SECTIONS: dict[str, Callable[[Bench], Theme]] = {
     "at rest": at_rest.section,
@@ -88,9 +88,10 @@ def verify(
             progress(f"  {_missed(check)}")
         progress(f"  {time.perf_counter() - began:.0f} s")
     name = "simulator" if device == "cpu" else f"simulator-{device.replace(':', '-')}"
+    provenance = environment(device)
     if device != "cpu":
-        device = f"{device}, {environment(device)['device_name']}"
-    write_text(root / f"reports/{name}.md", markdown(sections, device))
+        device += f", {provenance['device_name']}"
+    write_text(root / f"reports/{name}.md", markdown(sections, device, provenance["commit"]))
     return sections
 
 
@@ -110,10 +111,11 @@ def _missed(check: Measure) -> str:
     return f"not met: {check.name}: {_figure(check.value, check)}, limit {_limit(check)}"
 
 
-def markdown(sections: list[Theme], device: str) -> str:
+def markdown(sections: list[Theme], device: str, commit: str) -> str:
     """The whole page."""
     checks = [check for section in sections for check in section.checks]
-    head = HEAD.format(met=len(checks) - len(unmet(checks)), count=len(checks), device=device)
+    met = len(checks) - len(unmet(checks))
+    head = HEAD.format(met=met, count=len(checks), device=device, commit=commit)
     return "\n".join([head, *map(_part, sections)])
 
 

@@ -262,7 +262,7 @@ def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> Clamped
 
 
 def _clamps(episode: Episode, band: Band, settings: Settings) -> ClampCalibration:
-    sling = ClampedBand.of(band, settings.setup, settings.sling, as_rod=True)
+    sling = ClampedBand.of(band, settings.setup, settings.sling)
     return calibrate_clamps(settings, sling, episode, workers=cores())
 
 

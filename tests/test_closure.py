@@ -14,7 +14,6 @@ from pipeline.base import code as of_project
 from pipeline.base.code import CODE, NESTED, ROOT, UNTRACKED, closure, concern, files_of
 from stages.start import ungrouped
 from tests.project import write_files
-from tools import architecture
 from tools.closure import BY_NAME, folders, script_of
 
 STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
@@ -46,8 +45,7 @@ imports = cache(of_project.imports)
 @pytest.fixture(scope="module", autouse=True)
 def each_file_is_read_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        for module in (of_project, architecture):
-            patch.setattr(module, "imports", imports, raising=False)
+        patch.setattr(of_project, "imports", imports)
         yield
 
 
@@ -228,8 +226,3 @@ def test_closure_follows_every_form_of_import(tmp_path: Path) -> None:
         "pipeline/c",
         "stages/s.py",
     ]
-
-
-def test_the_drawing_of_the_imports_is_of_today() -> None:
-    page = architecture.PAGE.read_text(encoding="utf-8")
-    assert architecture.drawn(page) == page, "run `python tools/architecture.py --fix`"

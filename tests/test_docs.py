@@ -16,7 +16,7 @@ from app.cli import parser
 from pipeline.report.card.text import GLOSSARY
 from pipeline.report.quantities import QUANTITIES
 from tests.project import DEFAULTS, ROOT, in_use
-from validation.marked import CODE_BLOCK
+from validation.pages import CODE_BLOCK
 
 LINK = re.compile(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)")
 OURS = "app|docs|examples|pipeline|reports|sling2sim2real|stages|tests|tools|validation"

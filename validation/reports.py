@@ -1,4 +1,4 @@
-"""Reports of scripts: figures as plain JSON, with machine, versions, command and commit."""
+"""Reports of scripts: figures as plain JSON, with machine, versions, command and commit; tables."""
 
 from __future__ import annotations
 
@@ -42,6 +42,11 @@ def write_report(
     report = provenance | plain(content, digits)
     write_json(path, report)
     return report
+
+
+def row(*cells: object) -> str:
+    """A row of a Markdown table."""
+    return f"| {' | '.join(map(str, cells))} |"
 
 
 def plain(value: object, digits: int | None = None):

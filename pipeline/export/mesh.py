@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.simulator.cylinder import cylinder, volumes
 from pipeline.simulator.initial import fixed_frames, hanging_line
 from pipeline.simulator.interaction import blend
-from pipeline.simulator.model import ROD, ClampedBand
+from pipeline.simulator.model import ClampedBand
 
 CLAMPED = 0.015  # m of band in each clamp
 EDGES, GRADING = 48, 6.0  # 50 intervals with those in the clamps: 900 tetrahedra
@@ -51,7 +51,7 @@ class Tube:
             rings: Of vertices in the section.
         """
         steps = sling.steps.model_copy(update={"grading": grading})
-        arc = replace(sling, edges=edges, mesh=ROD, steps=steps).arc
+        arc = replace(sling, edges=edges, steps=steps).arc
         whole = np.concatenate([[-CLAMPED], arc, [sling.rest_length + CLAMPED]])
         rest, tetrahedra = cylinder(whole, 2 * sling.radius, rings)
         share = np.repeat(volumes(rest, tetrahedra) / 4, 4)

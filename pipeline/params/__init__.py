@@ -124,9 +124,6 @@ class Params(Section):
             raise refusal("setup.foot_height: must be less than setup.fork_height")
         if self.setup.draw_z[0] <= -self.setup.fork_height:
             raise refusal("setup.draw_z: must be above the floor, setup.fork_height below the tips")
-        for name, method in self.methods.items():
-            if method.law == "rubber" and self.sling.mesh != "rod":
-                raise refusal(f"methods.{name}.law: rubber is for sling.mesh: rod alone")
         for name, band in self.bands.items():
             if band.rest_length <= self.setup.fork_width:
                 raise refusal(

@@ -40,10 +40,8 @@ ENGINES = OUR_ENGINE, "physx"
 
 
 class SlingParams(Section):
-    mesh: Literal["rod", "tetrahedra"]
     edges: Annotated[int, Range(4, 400)]
     grading: Annotated[float, Range(1, 20)]
-    tet_edges: Annotated[int, Range(4, 400)]
     grip_step: Step
     hold_step: Step
     recoil_step: Step
@@ -54,9 +52,8 @@ class SlingParams(Section):
 
     @model_validator(mode="after")
     def _middle_is_a_layer(self) -> SlingParams:
-        for name in ("edges", "tet_edges"):
-            if getattr(self, name) % 2:
-                raise refusal(f"{name} must be even: the hand holds the middle")
+        if self.edges % 2:
+            raise refusal("edges must be even: the hand holds the middle")
         return self
 
 
@@ -91,18 +88,9 @@ class ParameterBoxes(Section):
     damping_scale: Box[DampingScale]
 
 
-class HeldOut(Section):
-    """Blocks of the recording that are kept out of the fit, to check it."""
-
-    blocks: Annotated[int, Range(0, 20)]
-    length: Annotated[float, Range(0.5, 5)]  # s
-
-
 class LossParams(Section):
-    chamfer: Literal["symmetric", "measured", "clouds"]
+    chamfer: Literal["symmetric", "clouds"]
     median_window: Annotated[int, Range(1, 101)]
-    late_decay: Annotated[float, Range(1e-3, 100)] | None  # 1/sample
-    held_out: HeldOut
 
     @model_validator(mode="after")
     def _window_has_a_middle(self) -> LossParams:

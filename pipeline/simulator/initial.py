@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.simulator import tetrahedra
-from pipeline.simulator.model import ROD, ClampedBand
+from pipeline.simulator.model import DOFS, ClampedBand
 
 
 def clamp_tangents(sling: ClampedBand) -> np.ndarray:
@@ -54,8 +53,8 @@ def _directors(
 
 
 def sections_of(sling: ClampedBand, nodes: np.ndarray) -> np.ndarray:
-    """Cross-sections (..., L, dofs) of bands through `nodes` (..., L, 3)."""
-    state = np.zeros((*nodes.shape[:-1], 9))
+    """Cross-sections (..., L, DOFS) of bands through `nodes` (..., L, 3)."""
+    state = np.zeros((*nodes.shape[:-1], DOFS))
     state[..., :3] = nodes
     edges = np.diff(nodes, axis=-2)
     length = np.linalg.norm(edges, axis=-1)
@@ -63,18 +62,7 @@ def sections_of(sling: ClampedBand, nodes: np.ndarray) -> np.ndarray:
     for end, half in enumerate((slice(0, sling.middle), slice(sling.middle, sling.edges))):
         state[..., half, 3:] = _directors(sling, end, direction[..., half, :], stretch[..., half])
     state[..., -1, 3:] = fixed_frames(sling)[1].ravel()
-    return _meshed(sling, state)
-
-
-def _meshed(sling: ClampedBand, rod: np.ndarray) -> np.ndarray:
-    """Cross-sections of the sling's mesh for a rod's (..., L, 9), whose directors are edges'."""
-    if sling.mesh == ROD:
-        return rod
-    frames = fixed_frames(sling)[:2].reshape(2, 6)
-    after = rod[..., 3:]
-    directors = (after + np.roll(after, 1, axis=-2)) / 2
-    directors[..., [0, -1], :] = frames
-    return tetrahedra.sections(rod[..., :3], directors, sling.radius)
+    return state
 
 
 def hanging_line(
@@ -92,15 +80,15 @@ def hanging_line(
 
 
 def hanging_guess(sling: ClampedBand) -> np.ndarray:
-    """A U below the tips, shape (sections, dofs)."""
+    """A U below the tips, shape (sections, DOFS)."""
     return sections_of(sling, hanging_line(sling.half_width, sling.rest_length, sling.arc)[0])
 
 
 def drawn_guess(sling: ClampedBand, draws: np.ndarray) -> np.ndarray:
-    """Two straight halves from the tips to each draw (N, 2), shape (N, sections, dofs)."""
+    """Two straight halves from the tips to each draw (N, 2), shape (N, sections, DOFS)."""
     middle = np.column_stack([np.zeros(len(draws)), draws])
     part = (sling.arc / sling.arc[sling.middle])[: sling.middle + 1, None]
-    state = np.zeros((len(draws), sling.sections, 9), np.float32)
+    state = np.zeros((len(draws), sling.sections, DOFS), np.float32)
     halves = slice(0, sling.middle + 1), slice(sling.middle, None)
     for end, (half, tip) in enumerate(zip(halves, sling.tips, strict=True)):
         span = middle - tip
@@ -110,4 +98,4 @@ def drawn_guess(sling: ClampedBand, draws: np.ndarray) -> np.ndarray:
         stretch = length / (sling.rest_length / 2)
         state[:, half, 3:] = _directors(sling, end, direction, stretch)[:, None]
     state[:, -1, 3:] = fixed_frames(sling)[1].ravel()
-    return _meshed(sling, state)
+    return state

@@ -1,4 +1,4 @@
-"""The native text of the simulator as a Warp kernel, one for each element and mesh.
+"""The native text of the simulator as a Warp kernel, one for each law and mesh.
 
 (Warp reads annotations: no postponed ones here.)
 """
@@ -12,16 +12,14 @@ from pathlib import Path
 import warp as wp
 
 from pipeline.base.native import built_once, text_of
+from pipeline.simulator.model import DOFS
 from pipeline.simulator.records import macros
 from pipeline.simulator.rubber import RUBBER, memories
-from pipeline.simulator.tetrahedra import CORNERS
 
 
 @built_once
 def sling_kernel(
-    element: str,
     law: str,
-    dofs: int,
     sections: int,
     middle: int,
     double: bool,
@@ -57,19 +55,17 @@ def sling_kernel(
         first_free: int
         launching: int
 
-    parts = ("lanes.h", "state.h", "material.h", "rubber.h", f"{element}.h", "solve.h", "step.h")
-    tetrahedra = {} if element == "rod" else {"TETS": len(CORNERS), "CORNERS": _braced(CORNERS)}
+    parts = ("lanes.h", "state.h", "material.h", "rubber.h", "rod.h", "solve.h", "step.h")
     text = text_of(
         *(Path(__file__).with_name(part) for part in parts),
         arrays=Arrays,
         SC="double" if double else "float",
         W=lanes,
-        N=dofs,
+        N=DOFS,
         L=sections,
         MID=middle,
         RUBBER=int(law == RUBBER),
         MEMORIES=memories(law),
-        **tetrahedra,
         **macros(),
     )
 
@@ -82,8 +78,3 @@ def sling_kernel(
         march(wp.tid(), arrays)
 
     return run, Arrays
-
-
-def _braced(table) -> str:
-    """A table of integers as C writes it."""
-    return str(table.tolist()).translate(str.maketrans("[]", "{}"))

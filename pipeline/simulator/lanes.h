@@ -53,11 +53,7 @@ auto all_lanes = [](auto mask) -> bool { bool all = true; for (int k = 0; k < W;
 auto root = [](real x) -> real { real y; for (int k = 0; k < W; ++k) y[k] = __builtin_sqrt(x[k]); return y; };
 #define ALL(mask) all_lanes(mask)
 #define SQRT(x) root(x)
-#if N > 9
-#define UNROLL                                           // it would take minutes to compile
-#else
 #define UNROLL _Pragma("clang loop unroll(full)")
-#endif
 #define FIRST_ROW(c) (c)
 auto team_maximum = [](real x) -> real { return x; };
 #endif

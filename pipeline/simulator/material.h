@@ -22,11 +22,13 @@
 // material whose s d is HOLDS [s], less and less up to a stretch of TAUT; one turned inside out keeps all.
 
 // F now, predicted, and its rate -> stress (columns) and its derivative, K[k (k + 1) / 2 + l] for columns k >= l,
-// exact as long as p / mu is between `least` and `most`; `shaped` scales s further
+// exact as long as p / mu is between LEAST and MOST; `shaped` scales s further
+#define LEAST -1.5
+#define MOST 0.25
 #define TURNS 1e-2
 #define HOLDS 1e-4
 #define TAUT 1.2
-auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&xt)[3][3], SC least, SC most, real shaped, real (&stress)[3][3], real (&K)[6][3][3]) {
+auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&xt)[3][3], real shaped, real (&stress)[3][3], real (&K)[6][3][3]) {
   real C[3][3], Cp[3][3], square = zero;  // cofactors; m squared
   UNROLL for (int k = 0; k < 3; ++k) {
     cross(x[(k + 1) % 3], x[(k + 2) % 3], C[k]); cross(xp[(k + 1) % 3], xp[(k + 2) % 3], Cp[k]);
@@ -36,7 +38,7 @@ auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&
   const real J = dot(x[0], C[0]), Jp = dot(xp[0], Cp[0]);
   const real p = lam * (J - (SC)1) - mu;
   // far from rest Newton's method takes a smaller part of what may be negative
-  const real pc = minimum(maximum(p, least * mu), most * mu);
+  const real pc = minimum(maximum(p, (SC)LEAST * mu), (SC)MOST * mu);
   inexact = pc == p ? inexact : one;
   const real bound = mu / SQRT(maximum(square, zero + (SC)1e-6));
   const real kept = minimum(maximum(Jp, zero), one);

@@ -9,13 +9,12 @@ import numpy as np
 
 from pipeline.params.identification import SlingParams
 from pipeline.params.lab import SetupParams
-from pipeline.simulator import tetrahedra
 from pipeline.simulator.rubber import NEO_HOOKEAN
 
 GRAVITY = 9.81
 FAR = 1.0  # m, farther than a band is drawn
 CYLINDER_DRAG = 1.1  # across the wind, at Reynolds numbers of 1e3 to 1e4 (Wieselsberger 1921)
-ROD, TETRAHEDRA = "rod", "tetrahedra"  # meshes: rod.h, tetrahedra.h
+DOFS = 9  # of a cross-section: a node and two directors
 
 
 class BandSizes(Protocol):
@@ -112,20 +111,16 @@ class ClampedBand:
         clamp_direction: Unit vector along which the band leaves the tip at -x, shape (3,); it
             leaves the other tip along the mirror image.
         flexural_rigidity: E I of the band where it was measured [N m^2]; None takes a solid round
-            band's, which follows Young's modulus. Tetrahedra are solid and round: they bend as
-            their mesh does, whatever was measured.
+            band's, which follows Young's modulus.
         grip_force, finger_opening_time: Of the fingers that hold the middle of a recorded band, as
             in params.yaml `setup` [N, s].
         steps: The step sizes and the mesh's grading, as in params.yaml `sling`.
         clamped: Whether the first and the last end are held; experiments on a free band let go.
         clamp_twist: Of the last clamp about the band, against the first [rad].
-        air_density: For the drag of a cylinder across the wind [kg/m^3], which tetrahedra do not
-            feel.
-        law: NEO_HOOKEAN, or RUBBER (rubber.h), which the rod alone knows.
+        air_density: For the drag of a cylinder across the wind [kg/m^3].
+        law: NEO_HOOKEAN, or RUBBER (rubber.h).
         stretched: Largest stretch that the band has seen before, which softened it; one, or one of
             each in a batch, shape (N,).
-        mesh: ROD, or TETRAHEDRA: a solid cylinder, whose edges are equally long. What of the band
-            is inside the clamps does not deform there, so that the mesh ends at them.
     """
 
     edges: int
@@ -140,7 +135,6 @@ class ClampedBand:
     steps: SlingParams
     clamped: tuple[bool, bool] = (True, True)
     clamp_twist: float = 0.0
-    mesh: str = ROD
     air_density: float = 0.0
     law: str = NEO_HOOKEAN
     stretched: float | np.ndarray = 1.0
@@ -154,7 +148,6 @@ class ClampedBand:
         mounting: ClampValues | None = None,
         *,
         law: str = NEO_HOOKEAN,
-        as_rod: bool = False,
     ) -> ClampedBand:
         """Make it from params.yaml's `bands.<band>`, `setup` and `sling`.
 
@@ -162,15 +155,10 @@ class ClampedBand:
             mounting: What the slack band shows of itself (pipeline/identify/clamps.py); without it,
                 the setup's clamp direction and a solid round band.
             law: Of its material.
-            as_rod: Whatever mesh the resolution asks for.
         """
-        mesh, edges = ROD, resolution.edges
-        if not as_rod:
-            mesh = resolution.mesh
-            edges = {ROD: edges, TETRAHEDRA: resolution.tet_edges}[mesh]
         direction = np.asarray((mounting or setup).clamp_direction, float)
         made = cls(
-            edges=edges,
+            edges=resolution.edges,
             rest_length=band.rest_length,
             radius=band.diameter / 2,
             mass=band.mass,
@@ -181,7 +169,6 @@ class ClampedBand:
             finger_opening_time=setup.finger_opening_time,
             air_density=setup.air_density,
             steps=resolution,
-            mesh=mesh,
             law=law,
         )
         return replace(made, stretched=float(made.drawn(np.array(first_draw(band)))))
@@ -199,19 +186,12 @@ class ClampedBand:
         return self.edges // 2
 
     @property
-    def dofs(self) -> int:
-        """Degrees of freedom of a cross-section: a node and two directors, or its vertices."""
-        return 9 if self.mesh == ROD else tetrahedra.DOFS
-
-    @property
     def edge_lengths(self) -> np.ndarray:
         """Rest length of each edge [m], shape (edges,).
 
         A taut band turns within sqrt(E I / tension), a few millimetres, at the clamps and in the
-        hand: there the rod's edges are `grading` times shorter than midway between them.
+        hand: there the edges are `grading` times shorter than midway between them.
         """
-        if self.mesh == TETRAHEDRA:
-            return np.full(self.edges, self.rest_length / self.edges)
         place = (np.arange(self.middle) + 0.5) / self.middle
         half = 1 + (self.steps.grading - 1) * np.sin(np.pi * place) ** 2
         sizes = np.concatenate([half, half])

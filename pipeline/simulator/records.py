@@ -43,7 +43,7 @@ class Outcome(IntEnum):
     SEPARATED, GOING_ON, NOT_CONVERGED, SLIPPED = range(-1, 3)
 
 
-# what all slings of a batch share; `shortest`: edge, or radius, where that is shorter and meshed
+# what all slings of a batch share; `shortest`: edge
 SETTING = _record(
     "mean_edge", "area", "radius2", "line_mass", "wind", "gravity", "tolerance", "step_limit",
     "max_iterations", ("clamped", 2), "shortest",

@@ -12,12 +12,7 @@
 // far from each other would gain energy.
 //
 // For solve.h and step.h: what one section adds to the Hessian and the residual (stage_section), column by column
-// (hessian_column), and what else depends on the element: which degrees of freedom are places (the first ones), their
-// masses, and the hand's hold.
-
-const int PLACES = 3;  // of the node; the others are directors
-auto share = [](int) -> SC { return 1; };             // of a place in the section's mass
-auto in_hand = [](int) -> SC { return 0; };           // a place from the hand's, while it is held
+// (hessian_column); the masses, and the hand's hold. The first three degrees of freedom are the node's, the others directors.
 
 // a staged section: its own block (lower triangle), stretch between nodes, gradient of the twist on both sides of
 // the joint, coefficients of bending and twist, residual of this section and of the next
@@ -110,10 +105,10 @@ auto stage_section = [&](int i) {
     }
     real stress[3][3], K[6][3][3];
 #if RUBBER
-    material(x, xp, xt, (SC)-1.5, (SC)0.25, steeper(xp[0]), stress, K);
+    material(x, xp, xt, steeper(xp[0]), stress, K);
     add_rubber(i, x[0], stress[0], K[0]);
 #else
-    material(x, xp, xt, (SC)-1.5, (SC)0.25, one, stress, K);
+    material(x, xp, xt, one, stress, K);
 #endif
     UNROLL for (int c = 0; c < 3; ++c) {
       f_next[c] = volume * stress[0][c] * per_ds; f[c] -= f_next[c];

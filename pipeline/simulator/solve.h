@@ -18,7 +18,7 @@ real indefinite = zero, poison = zero;        // whether a pivot is not positive
 auto weigh = [&](int i, real (&before)[N]) {
   UNROLL for (int m = 0; m < N; ++m) {
     const real f = RESIDUAL(m, i) + before[m];
-    if (moves(i, m)) { imbalance = maximum(imbalance, magnitude(f) * (m < PLACES ? (SC)1 : per_edge)); poison += f * zero; }
+    if (moves(i, m)) { imbalance = maximum(imbalance, magnitude(f) * (m < 3 ? (SC)1 : per_edge)); poison += f * zero; }
   }
 };
 
@@ -36,7 +36,7 @@ auto take = [&](int i, real (&D)[COLUMNS][N], real (&U)[COLUMNS][N], real (&next
     if (c < N) { UNROLL for (int m = FIRST_ROW(c); m < N; ++m) D[q][m] += next[q][m]; }
     else { UNROLL for (int m = 0; m < N; ++m) U[q][m] += next[q][m]; }
     // opening pads hold the band back with what friction they have left
-    if (i == MID && opening && c >= N) UNROLL for (int m = 0; m < PLACES; ++m) U[q][m] += share(m) * capacity * direction[m % 3];
+    if (i == MID && opening && c >= N) UNROLL for (int m = 0; m < 3; ++m) U[q][m] += capacity * direction[m];
     if (special) {
       const bool here = c >= N || moves(i, c), there = c >= N || (!met && after < L && moves(after, c));
       UNROLL for (int m = 0; m < N; ++m) {
@@ -119,7 +119,7 @@ auto substitute = [&]() {
       if (c < N) {
         DX(c, SECTION(at)) = x[q];
         poison += x[q] * zero;
-        change = maximum(change, magnitude(x[q]) * (c < PLACES ? (SC)1 : mean_edge));  // a director counts as a turn of its edge
+        change = maximum(change, magnitude(x[q]) * (c < 3 ? (SC)1 : mean_edge));  // a director counts as a turn of its edge
       }
     }
   }
@@ -132,7 +132,7 @@ auto eliminate_again = [&](int i, real (&next)[OWN_ROWS]) {
   UNROLL for (int q = 0; q < OWN_ROWS; ++q) {
     const int c = q + mine;
     x[q] = c < N && moves(i, c) ? RESIDUAL(c, i) + next[q] : zero;
-    if (i == MID && opening && c < PLACES) x[q] += share(c) * capacity * direction[c % 3];
+    if (i == MID && opening && c < 3) x[q] += capacity * direction[c];
     next[q] = c < N ? RESIDUAL_NEXT(c, i) : zero;
   }
   UNROLL for (int k = 0; k < N; ++k) {

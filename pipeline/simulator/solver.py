@@ -7,11 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.base.errors import UserError
-from pipeline.simulator import tetrahedra
 from pipeline.simulator.initial import fixed_frames
 from pipeline.simulator.material import material
-from pipeline.simulator.model import CYLINDER_DRAG, GRAVITY, TETRAHEDRA, ClampedBand
+from pipeline.simulator.model import CYLINDER_DRAG, DOFS, GRAVITY, ClampedBand
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import LANE, OUTPUT, SETTING, numbers, records, width
 from pipeline.simulator.rubber import RUBBER, memories, work
@@ -28,7 +26,7 @@ class Slings:
 
     Attributes:
         coefficients: Of their material, records (N,) of records.MATERIAL.
-        state: Cross-sections, shape (N, sections, dofs) or (sections, dofs).
+        state: Cross-sections, shape (N, sections, DOFS) or (sections, DOFS).
         lanes: Records (N,) of records.LANE.
     """
 
@@ -56,7 +54,7 @@ class Slings:
             records["worst"] = work(np.array(band.stretched), *shape)
         for name, values in lanes.items():
             records[name] = values
-        shape = len(parameters), band.sections, band.dofs
+        shape = len(parameters), band.sections, DOFS
         return cls(material(band, parameters, rigidity), np.broadcast_to(state, shape), records)
 
     def __len__(self) -> int:
@@ -72,7 +70,7 @@ class Frames:
 
     Attributes:
         steps, weights: Step in which each frame falls and its place in it, shape (K,).
-        width: Numbers of a cross-section: 3 of its centre, `sling.dofs` for all.
+        width: Numbers of a cross-section: 3 of its centre, DOFS for all.
     """
 
     steps: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
@@ -112,7 +110,7 @@ class Stepped:
     """N slings after S steps, K frames recorded.
 
     Attributes:
-        state: At the end, shape (N, sections, dofs).
+        state: At the end, shape (N, sections, DOFS).
         lanes: Records (N,) of records.LANE.
         output: Force on the hand and Newton iterations of each step, shape (N, S, 4), in the order
             of records.OUTPUT; empty for launches.
@@ -133,16 +131,8 @@ def run(
     frames: Frames | None = None,
     options: Options | None = None,
 ) -> Stepped:
-    """Step N slings of one geometry through a schedule.
-
-    Raises:
-        UserError: Tetrahedra on a GPU, or of the law `rubber`.
-    """
+    """Step N slings of one geometry through a schedule."""
     frames, options = frames or Frames(), options or Options()
-    if options.on_gpu and sling.mesh == TETRAHEDRA:
-        raise UserError("sling.mesh: tetrahedra run on the CPU alone; on a GPU take the rod")
-    if sling.law == RUBBER and sling.mesh == TETRAHEDRA:
-        raise UserError("sling.mesh: tetrahedra do not know the law `rubber`; take the rod")
     work = _Work(sling, schedule, slings, frames, options)
     if options.on_gpu or options.workers == 1 or work.rows == 1:
         arrays = work.part(0, work.rows)
@@ -154,7 +144,7 @@ def run(
     state, lanes, output, recorded = (arrays[name][:count] for name in RETURNED)
     n_steps = 0 if options.launching else len(schedule.steps)
     return Stepped(
-        state=state.reshape((count, sling.dofs, sling.sections)).swapaxes(1, 2),
+        state=state.reshape((count, DOFS, sling.sections)).swapaxes(1, 2),
         lanes=records(lanes, LANE),
         output=output.reshape((count, n_steps, width(OUTPUT))),
         frames=recorded.reshape((count, len(frames.steps), sling.sections, frames.width)),
@@ -175,13 +165,13 @@ def _widths(
     sling: ClampedBand, schedule: Schedule, frames: Frames, options: Options
 ) -> dict[str, int]:
     """Numbers that each array which a kernel writes holds of one sling."""
-    stored = (2 * sling.dofs + 2) * sling.sections * (sling.dofs + 1)
+    stored = (2 * DOFS + 2) * sling.sections * (DOFS + 1)
     if options.on_gpu:  # by two chains, and for spare threads
-        stored = (2 * sling.dofs + 1) * (sling.middle + 1) * WARP
+        stored = (2 * DOFS + 1) * (sling.middle + 1) * WARP
     return {
-        "state": sling.dofs * sling.sections,
+        "state": DOFS * sling.sections,
         "lanes": width(LANE),
-        "scratch": (9 * sling.dofs + memories(sling.law) + 4) * sling.sections,
+        "scratch": (9 * DOFS + memories(sling.law) + 4) * sling.sections,
         "work": stored,
         "output": 0 if options.launching else width(OUTPUT) * len(schedule.steps),
         "frames": len(frames.steps) * sling.sections * frames.width,
@@ -208,7 +198,7 @@ class _Work:
         on_gpu, self.options = options.on_gpu, options
         self.lanes = 1 if on_gpu else LANES // (2 if options.double else 1)
         self.dtype = np.float64 if options.double else np.float32
-        mesh = sling.mesh, sling.law, sling.dofs, sling.sections, sling.middle
+        mesh = sling.law, sling.sections, sling.middle
         self.kernel, self.arrays = sling_kernel(*mesh, options.double, self.lanes, on_gpu)
         self.widths = _widths(sling, schedule, frames, options)
         self.common = self._common(sling, schedule, frames)
@@ -222,12 +212,9 @@ class _Work:
 
     def _common(self, sling: ClampedBand, schedule: Schedule, frames: Frames) -> dict:
         """What all slings share."""
-        mesh, setting = sling.edge_lengths, _setting(sling, self.options)
-        if sling.mesh == TETRAHEDRA:
-            mesh = np.concatenate([mesh, tetrahedra.table(sling.radius)])
         values = {
-            "setting": numbers(setting),
-            "mesh": mesh,
+            "setting": numbers(_setting(sling, self.options)),
+            "mesh": sling.edge_lengths,
             "clamp": fixed_frames(sling),
             "schedule": numbers(schedule.steps),
             "frame_weight": np.append(frames.weights, 0.0),
@@ -287,9 +274,6 @@ class _Work:
 def _setting(sling: ClampedBand, options: Options) -> np.ndarray:
     """A record of records.SETTING, shape (1,)."""
     result = np.zeros(1, SETTING)
-    shortest = sling.edge_lengths.min()
-    if sling.mesh == TETRAHEDRA:
-        shortest = min(shortest, sling.radius)
     values = {
         "mean_edge": sling.rest_length / sling.edges,
         "area": sling.area,
@@ -301,7 +285,7 @@ def _setting(sling: ClampedBand, options: Options) -> np.ndarray:
         "step_limit": STEP_LIMIT,
         "max_iterations": options.max_iterations,
         "clamped": sling.clamped,
-        "shortest": shortest,
+        "shortest": sling.edge_lengths.min(),
     }
     for name, value in values.items():
         result[name] = value

@@ -8,7 +8,7 @@ const int SAVED = 2 * N + 1 + AGAIN;  // numbers kept of a column: multipliers, 
 const SC mean_edge = SET(MEAN_EDGE), area = SET(AREA), radius2 = SET(RADIUS2);
 const SC wind = SET(WIND), line_mass = SET(LINE_MASS), gravity = SET(GRAVITY), node_mass = line_mass * mean_edge;
 const SC per_edge = (SC)1 / mean_edge;
-const SC* edge = mesh.data;  // rest length of each edge; after them, what else the element wants
+const SC* edge = mesh.data;  // rest length of each edge
 const SC tolerance = SET(TOLERANCE), step_limit = SET(STEP_LIMIT), shortest = SET(SHORTEST);
 const int max_iterations = (int)SET(MAX_ITERATIONS);
 const bool first_clamped = SET(CLAMPED) > 0, last_clamped = setting.data[SETTING_CLAMPED + 1] > 0;

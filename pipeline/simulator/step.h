@@ -9,18 +9,11 @@
 
 const SC close = sqrt(0.25 * tolerance * shortest);  // from here on Newton's next change is below the tolerance
 // a residual that counts for nothing [N]: by default 3 % of a node's weight, and what a strain of 1e-5 takes
-const real balance = tolerance * (SC)(3.0 / PLACES) * ((SC)1.5e4 * node_mass * gravity + (SC)5 * mu * area);
-real offset[PLACES], pull = zero, held[3] = {zero, zero, zero};  // of the hand; the force on it when it last held
-UNROLL for (int m = 0; m < PLACES; ++m) offset[m] = zero;
+const real balance = tolerance * ((SC)1.5e4 * node_mass * gravity + (SC)5 * mu * area);
+real offset[3] = {zero, zero, zero}, pull = zero, held[3] = {zero, zero, zero};  // of the hand; the force on it when it last held
 real contact_before = zero, lowest = zero + (SC)1e30;  // of the pouch, and its least height
 real given[3] = {zero, zero, zero}, owed[3] = {zero, zero, zero}, relaxed = one;  // an arm that gives way
 int iterations = 0;
-
-auto middle = [&](const real* dofs, int c) -> real {  // of the held section: the mean of its places
-  real mean = share(0) * dofs[c * L];
-  UNROLL for (int m = 3; m < PLACES; m += 3) mean += share(m) * dofs[(m + c) * L];
-  return mean;
-};
 
 for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
   const real x = INITIAL[k * L + i];
@@ -54,11 +47,11 @@ for (int step = 0; step < steps; ++step) {
     relaxed = minimum(maximum(relaxed * turn / maximum(size, zero + (SC)1e-16), zero + (SC)0.05), one);
     UNROLL for (int c = 0; c < 3; ++c) given[c] += relaxed * owed[c];
   }
-  real target[PLACES];
-  UNROLL for (int m = 0; m < PLACES; ++m) {
-    const SC place = row[STEP_TARGET + m % 3] + in_hand(m);
-    if (attached && !was_attached) offset[m] = X1(m, MID) - place;
-    target[m] = given[m % 3] + place + blend * offset[m];
+  real target[3];
+  UNROLL for (int c = 0; c < 3; ++c) {
+    const SC place = row[STEP_TARGET + c];
+    if (attached && !was_attached) offset[c] = X1(c, MID) - place;
+    target[c] = given[c] + place + blend * offset[c];
   }
   // what the pads can hold: all of it while they are closed, then less and less of the pull at the release
   capacity = opening ? maximum(pull - grip_force * friction, zero) : grip_force * friction;
@@ -66,10 +59,10 @@ for (int step = 0; step < steps; ++step) {
   // ---- predicted state, and what the step starts from
   for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
     const real x1 = X1(k, i), v1 = V1(k, i), y = x1 + past * (x1 - X2(k, i));
-    const bool led = k < PLACES && i == MID && attached;
-    const real x = led ? target[k < PLACES ? k : 0] : moves(i, k) ? x1 + h * v1 : x1;
+    const bool led = k < 3 && i == MID && attached;
+    const real x = led ? target[k < 3 ? k : 0] : moves(i, k) ? x1 + h * v1 : x1;
     X(k, i) = x; XP(k, i) = x; Y(k, i) = y;
-    XH(k, i) = y + bh * (v1 + past * (v1 - V2(k, i))) - (k < PLACES && k % 3 == 2 ? gravity * bh * bh : (SC)0);
+    XH(k, i) = y + bh * (v1 + past * (v1 - V2(k, i))) - (k == 2 ? gravity * bh * bh : (SC)0);
   }
 #if RUBBER
   recall(row, relax);
@@ -145,18 +138,18 @@ for (int step = 0; step < steps; ++step) {
   // ---- the projectile separates at the first pull: contact = m (acceleration + gravity) along the launch direction
   if (grip == GRIP_FREE && launching) {
     real contact = zero, position[3], velocity[3];
-    lowest = outcome == zero ? minimum(lowest, middle(&X1(0, MID), 2)) : lowest;
+    lowest = outcome == zero ? minimum(lowest, X1(2, MID)) : lowest;
     UNROLL for (int c = 0; c < 3; ++c) {
-      position[c] = middle(&X(0, MID), c);
-      velocity[c] = (position[c] - middle(&Y(0, MID), c)) * ibh;
-      const real v1 = middle(&V1(0, MID), c), v = v1 + past * (v1 - middle(&V2(0, MID), c));
+      position[c] = X(c, MID);
+      velocity[c] = (position[c] - Y(c, MID)) * ibh;
+      const real v1 = V1(c, MID), v = v1 + past * (v1 - V2(c, MID));
       contact += payload * ((velocity[c] - v) * ibh + (c == 2 ? gravity : (SC)0)) * direction[c];
     }
     const real before = step > first_free ? contact_before : contact;
     const real w = minimum(maximum(before / maximum(before - contact, zero + (SC)1e-9), zero), one);
     const real separates = (payload > zero ? one : zero) * (contact > zero ? zero : one);
     UNROLL for (int c = 1; c < 3; ++c) {
-      const real x1 = middle(&X1(0, MID), c), v1 = middle(&V1(0, MID), c);
+      const real x1 = X1(c, MID), v1 = V1(c, MID);
       separation[c] = separates > zero ? x1 + w * (position[c] - x1) : separation[c];
       separation[2 + c] = separates > zero ? v1 + w * (velocity[c] - v1) : separation[2 + c];
     }

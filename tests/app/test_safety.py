@@ -123,11 +123,11 @@ def trained(params, **then) -> dict:
 def test_params_that_changed_since_training_by_key_values_and_cure(params, project) -> None:
     """Of the policy's own settings, and of those of the θ that it was trained with."""
     then = identified(params, **{"loss.median_window": 9})
-    del then["made_with"]["loss.held_out.length"]
+    del then["made_with"]["loss.chamfer"]
     card(project, made_with=trained(params))
     summary = [hazard.what for hazard in of_policy(params, project, then)]
     cure = f"since the policy was trained: `dvc repro {STAGE}` mends it"
-    assert summary[0] == f"params.yaml: loss.held_out.length was not there, is 0.6, {cure}"
+    assert summary[0] == f"params.yaml: loss.chamfer was not there, is symmetric, {cure}"
     assert summary[1] == f"params.yaml: loss.median_window was 9, is 7, {cure}"
     assert len(summary) == 2
     edit(project, "max_force: 30.0", "max_force: 25.0")
@@ -144,10 +144,10 @@ def test_a_theta_identified_anew_hides_no_change_of_the_policys(params, project)
 
 def test_many_changes_are_three_and_the_names_of_the_others(params, project) -> None:
     values = {f"setup.{name}": 1e-3 for name in ("max_force", "fork_width", "fork_height")}
-    card(project, made_with=trained(params, **values, **{"policy.seed": 7, "sling.mesh": "net"}))
+    card(project, made_with=trained(params, **values, **{"policy.seed": 7, "sling.edges": 12}))
     summary = of_policy(params, project)
     assert abouts(summary) == ["params"] * 4 and "policy.seed was 7, is 1" in summary[0].what
-    assert summary[3].what.endswith("also in setup.max_force, sling.mesh")
+    assert summary[3].what.endswith("also in setup.max_force, sling.edges")
 
 
 def test_a_card_that_does_not_tell(params, project) -> None:

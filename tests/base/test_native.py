@@ -17,7 +17,7 @@ def slow(*args):
 
 context.Runtime = slow
 with ThreadPoolExecutor(2) as pool:
-    list(pool.map(lambda edges: chamfer_kernel(edges, 4, 1, 4), (4, 6)))
+    list(pool.map(lambda edges: chamfer_kernel(edges, 4, 4), (4, 6)))
 print(len(starts))
 """
 SOMETHING_ELSE = """

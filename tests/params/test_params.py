@@ -169,8 +169,6 @@ REFUSED = [
     ("optimizer.k_nn", 9999, "optimizer: k_nn must be at most"),
     ("optimizer.cma_rollouts", 4, "optimizer: cma_rollouts must be at least"),
     ("sling.edges", 25, "sling: edges must be even"),
-    ("sling.tet_edges", 53, "sling: tet_edges must be even"),
-    ("sling.mesh", "wedge", "sling.mesh: must be 'rod' or 'tetrahedra'"),
     ("loss.median_window", 6, "loss: median_window must be odd"),
     ("episode.tail", 59.0, "episode: tail must be less"),
     ("episode.longest", 8.0, "episode: longest must be at least duration"),
@@ -214,7 +212,6 @@ REFUSED = [
     ("methods.de.fixed", {"poissons_ratio": 0.2}, "must be between 0.3 and 0.49, got 0.2"),
     ("methods.de.fixed", ALL_FIXED, "methods.de.fixed: names every parameter, so none is left"),
     ("methods.de.bounds", {"poissons_ratio": 0.4}, "bounds.poissons_ratio: must be a list"),
-    ("loss.held_out.length", 0.1, "loss.held_out.length: must be between 0.5 and 5"),
 ]
 
 

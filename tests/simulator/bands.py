@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from pipeline.simulator.cylinder import cylinder, volumes
 from pipeline.simulator.initial import sections_of
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip
@@ -53,11 +52,3 @@ def at_rest(sling, parameters, start) -> np.ndarray:
     done = run(sling, Schedule(relaxation(Grip.FREE), 0), slings, options=Options(double=True))
     assert done.lanes["outcome"][0] == 0
     return done.state[0]
-
-
-def vertex_masses(sling) -> np.ndarray:
-    """Of a tetrahedral band's vertices, in shares, shape (sections, 7)."""
-    rest, corners = cylinder(sling.arc, 2 * sling.radius)
-    mass = np.bincount(corners.ravel(), np.repeat(volumes(rest, corners), 4)).reshape(-1, 7)
-    mass[[0, -1]] = mass[1] / 2  # by the section, not by which way the diagonals run
-    return mass

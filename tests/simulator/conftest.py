@@ -9,7 +9,6 @@ import pytest
 from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.episode.episode import Episode
 from pipeline.simulator import ClampedBand, LaunchSetup
-from pipeline.simulator.model import TETRAHEDRA
 
 
 @pytest.fixture(scope="session")
@@ -22,13 +21,6 @@ def sling(params):
 def launch_setup(params):
     """By an arm that does not give way."""
     return replace(LaunchSetup.of(params.setup, params.sling), arm_stiffness=None)
-
-
-@pytest.fixture(scope="session")
-def solid(sling, params):
-    """The same as tetrahedra."""
-    resolution = params.sling.model_copy(update={"mesh": TETRAHEDRA})
-    return replace(sling, mesh=TETRAHEDRA, edges=resolution.tet_edges, steps=resolution)
 
 
 @pytest.fixture(scope="session")

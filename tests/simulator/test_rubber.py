@@ -192,11 +192,6 @@ def test_updates_are_exact_for_straight_histories():
     assert forget[1, :3].max() < 1e-40
 
 
-def test_tetrahedra_refuse_it_by_name(solid, launch_setup):
-    with pytest.raises(UserError, match="tetrahedra do not know the law `rubber`"):
-        launch(replace(solid, law=RUBBER), launch_setup, gum(), DRAW)
-
-
 def test_history_of_a_recording():
     """A cubic pull of 4 s and a pause of 2 s, with an approach before and a retreat after."""
     time = np.arange(0, 10, 0.03)

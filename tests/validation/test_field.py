@@ -5,7 +5,7 @@ import pytest
 
 from tests.recording.conftest import blind
 from validation.campaigns import field
-from validation.campaigns.field import CORRECT, FAULTS, SILENT, block, cases_of, is_right
+from validation.campaigns.field import CORRECT, FAULTS, SILENT, cases_of, is_right
 from validation.recordings.streams import FORCE, POSE, Bag
 
 __all__ = ["blind"]
@@ -72,5 +72,5 @@ def test_the_table_counts_by_class() -> None:
         {"fault": "saturated", "outcome": "refused"},
     ]
     family = field._family(results, "force")
-    message = block({"families": {"force": family}, "false_alarms": [], "sound_recordings": 3})
-    assert "| force | 3 | 1 | 1 | 0 | 1 | 4.0 %, 2 times |" in message
+    lines = field.table({"families": {"force": family}, "false_alarms": [], "sound_recordings": 3})
+    assert "| force | 3 | 1 | 1 | 0 | 1 | 4.0 %, 2 times |" in lines

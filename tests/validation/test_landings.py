@@ -1,20 +1,14 @@
 """The campaign of landings by each pull: what it runs, and what it says of results by hand."""
 
-import json
-
 import numpy as np
 import pytest
 
-from tests.project import ROOT
 from validation.campaigns.landings import (
     ONE_DIP,
-    PAGE,
     SETS,
     OneRecording,
-    block,
     figures,
     jobs,
-    report_of,
 )
 from validation.campaigns.rig_scores import TARGETS
 from validation.campaigns.runner import OURS
@@ -88,9 +82,3 @@ def test_figures_are_means_over_bands() -> None:
     assert (together["coverage"], together["least_coverage"]) == (0.5, 0.0)
     assert together["coverage_by_bands"] == [0.0, 1.0]
     assert together["median_width"] == pytest.approx(np.median(0.2 / TARGETS))
-
-
-def test_the_page_has_the_table_of_the_committed_reports(monkeypatch) -> None:
-    monkeypatch.chdir(ROOT)
-    contents = {name: json.loads(report_of(name).read_text("utf-8")) for name in SETS}
-    assert block(contents) in (ROOT / PAGE).read_text("utf-8")

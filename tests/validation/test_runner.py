@@ -14,8 +14,6 @@ from pipeline.base.errors import UserError
 from validation.campaigns.runner import (
     THREADS,
     ResultLines,
-    each,
-    made_once,
     prepare,
     results_of,
     run,
@@ -49,7 +47,6 @@ def test_a_run_that_was_killed_goes_on(tmp_path) -> None:
     run(None, [Square(2), Square(3)], ResultLines(path), 1)  # nothing is left to do
     some = ResultLines(path).among([Square(3), Square(5), Square(2)])
     assert [row["number"] for row in some] == [3, 2]
-    assert ResultLines(path).where(number=-1) == [{"number": -1, "failed": "no square"}]
 
 
 def slow(job: Square) -> dict:
@@ -75,23 +72,7 @@ def test_an_error_ends_the_run_and_what_was_done_is_kept(tmp_path) -> None:
     lines = ResultLines(tmp_path / "results.jsonl")
     with pytest.raises(ValueError, match="a fault of ours"):
         run(broken, [Square(n) for n in range(200)], lines, 1)
-    assert lines.where(number=0) and len(lines.lines) < 200
-
-
-def where(_: Square) -> tuple[int, set[int]]:
-    return os.getpid(), os.sched_getaffinity(0)
-
-
-@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="no core can be taken here")
-def test_a_process_has_a_core_of_its_own_where_there_are_as_many() -> None:
-    ours = os.sched_getaffinity(0)
-    for workers in (len(ours), len(ours) + 1):
-        cores = dict(each(where, [Square(n) for n in range(8)], workers))
-        if workers == len(ours):
-            taken = [core for some in cores.values() for core in some]
-            assert len(taken) == len(set(taken)) == len(cores) and ours.issuperset(taken)
-        else:
-            assert all(some == ours for some in cores.values())
+    assert Square(0) in lines.of(Square) and len(lines.lines) < 200
 
 
 def test_threads_are_as_before_after_the_block(monkeypatch) -> None:
@@ -100,11 +81,6 @@ def test_threads_are_as_before_after_the_block(monkeypatch) -> None:
     with single_threaded():
         assert {os.environ[name] for name in THREADS} == {"1"}
     assert os.environ[THREADS[0]] == "7" and THREADS[1] not in os.environ
-
-
-def test_what_is_there_is_not_made_again(tmp_path) -> None:
-    path = tmp_path / "kept.json"
-    assert made_once(path, lambda: {"a": 1}) == made_once(path, None) == {"a": 1}
 
 
 @pytest.mark.parametrize("only", [False, True])

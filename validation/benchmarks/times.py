@@ -4,8 +4,7 @@
 
 clones the commit that is checked out here into FOLDER, with caches of its own, so that everything
 is downloaded and compiled, and measures each step there. What succeeded is not measured again: the
-same command goes on where it was killed. It writes reports/benchmarks/times.json and its table into
-docs/times.md.
+same command goes on where it was killed. It writes reports/benchmarks/times.json.
 """
 
 from __future__ import annotations
@@ -25,10 +24,9 @@ from pipeline.base.code import ROOT
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from validation.benchmarks.timing import disk, measured
-from validation.marked import block_of, fill, row
-from validation.reports import write_report
+from validation.reports import row, write_report
 
-REPORT, PAGE = Path("reports/benchmarks/times.json"), Path("docs/times.md")
+REPORT = Path("reports/benchmarks/times.json")
 BAND = "timed"  # of the recording
 DEMO = (  # `make demo` in a clone of its own, where nothing has run
     "clone=$PWD && rm -rf ../demo && git clone -q . ../demo && cd ../demo"
@@ -121,22 +119,18 @@ def perform(step: MeasuredStep, folder: Path) -> dict:
     return result
 
 
-def block(report: dict) -> str:
-    """The block of docs/times.md."""
-    done = report["steps"].values()
-    share = max(result["others_share"] for result in done)
-    return block_of(
-        "times",
-        [
-            f"Measured on {report['cores']} cores of an {report['device_name']}, no GPU, of which"
-            f" other programs took {100 * share:.0f} % at most, by",
-            f"`{report['command']}`:",
-            "",
-            row("what", "time", "CPU time", "memory, at most", "on the disk afterwards"),
-            "|---|---:|---:|---:|---|",
-            *map(_row, done),
-        ],
-    )
+def table(report: dict) -> list[str]:
+    """The table of docs/times.md, and how it was measured."""
+    share = max(result["others_share"] for result in report["steps"])
+    return [
+        f"Measured on {report['cores']} cores of an {report['device_name']}, no GPU, of which"
+        f" other programs took {100 * share:.0f} % at most, by",
+        f"`{report['command']}`:",
+        "",
+        row("what", "time", "CPU time", "memory, at most", "on the disk afterwards"),
+        "|---|---:|---:|---:|---|",
+        *map(_row, report["steps"]),
+    ]
 
 
 def _row(result: dict) -> str:
@@ -156,16 +150,14 @@ def _size(count: float) -> str:
 
 
 def times(todo: Sequence[MeasuredStep], folder: Path, root: Path, arguments: str) -> dict:
-    """Measure the steps and write report and page of `root`; what the report says. UserError."""
+    """Measure the steps and write the report of `root`; what it says. Raises UserError."""
     folder.mkdir(parents=True, exist_ok=True)
     cloned(folder, root)
-    done = {}
+    done = []
     for step in todo:
         print(f"{step.name}: {' '.join(step.command)}", file=sys.stderr, flush=True)
-        done[step.name] = perform(step, folder)
-    report = write_report(root / REPORT, {"steps": done}, arguments)
-    fill(root / PAGE, block(report))
-    return report
+        done.append(perform(step, folder))
+    return write_report(root / REPORT, {"steps": done}, arguments)
 
 
 def main() -> None:

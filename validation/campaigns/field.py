@@ -1,7 +1,6 @@
 """What becomes of the faults that labs report: corrected, reported, or silently wrong.
 
     python -m validation.campaigns.field --orange FOLDER
-    python -m validation.campaigns.field --page     # the report's table into docs/recording.md
 
 Each fault of validation/recordings/faults.py is done to orange_2 in FOLDER and to a recording of
 the rig, in three sizes. What the checks say of it is kept; where no check of the fault's own
@@ -25,15 +24,12 @@ from pipeline.base.errors import UserError
 from pipeline.params import Params, load
 from validation import orange
 from validation.campaigns import runner
-from validation.campaigns.runner import read
-from validation.marked import block_of, fill, row
 from validation.projects import with_section
 from validation.recordings.faults import FAULTS
-from validation.reports import write_report
+from validation.reports import row, write_report
 from validation.rubbers import DEVELOP, SPENT, rubbers, with_rubbers
 
 WORK, REPORT = Path("data/field"), Path("reports/validation/field.json")
-PAGE, BLOCK = Path("docs/recording.md"), "field"
 SOUND = "none"  # the fault of a sound recording
 FAULTY = "orange_2", "band1_1001"  # what faults are done to
 ORANGE = "orange", "orange_2", "orange_3"
@@ -213,7 +209,7 @@ def report(args: argparse.Namespace, cases: list[Faulty], results: list[dict]) -
         "families": {name: _family(faulty, name) for name in families},
         "results": results,
     }
-    write_report(args.report, content, runner.orange_argument(args), digits=5)
+    write_report(args.report, content, "--orange FOLDER" if args.orange else "", digits=5)
     print(f"{args.report}: {len(results)} of {len(cases)}, {content['counts']}", flush=True)
     print(f"{len(alarms)} false alarms on {len(sound)} sound recordings")
 
@@ -237,8 +233,8 @@ def _family(results: list[dict], family: str) -> dict:
     }
 
 
-def block(content: dict) -> str:
-    """What docs/recording.md has between its marks, of a report's content."""
+def table(content: dict) -> list[str]:
+    """The table of docs/recording.md, of a report's content."""
     rows = [
         "| class | tried | corrected | reported | wrong, another check spoke | silently wrong |"
         " largest undetected error of E, s·d |",
@@ -253,16 +249,14 @@ def block(content: dict) -> str:
         if tried:
             rows.append(row(name, tried, *counts, largest))
     alarms = len(content["false_alarms"])
-    rows += ["", f"False alarms on {content['sound_recordings']} sound recordings: {alarms}."]
-    return block_of(BLOCK, rows)
+    return [*rows, "", f"False alarms on {content['sound_recordings']} sound recordings: {alarms}."]
 
 
 def main() -> None:
-    parser = runner.parser(__doc__, REPORT, WORK, page=PAGE, orange=True)
+    parser = runner.parser(__doc__, REPORT, WORK)
+    parser.add_argument("--orange", type=Path, help="folder of the recordings of that band")
     parser.add_argument("--faults", nargs="+", default=[*FAULTS], help="(default: all)")
     args = parser.parse_args()
-    if args.page:
-        return fill(PAGE, block(read(args.report)))
     faulty = [name for name in FAULTY if args.orange or name not in ORANGE]
     sound = [*(ORANGE if args.orange else ()), *RIG, *(f"{name}_0" for name in RUBBERS)]
     cases = cases_of(faulty, sound, args.faults)

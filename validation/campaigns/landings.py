@@ -10,9 +10,8 @@ is after an earlier pull, and identified by the default method from that one rec
 are scored without launch noise (bias), and one launch each with it (coverage). The first recording
 of each virgin band is also identified by the paper's method, and by ours with a launch measured.
 Results are lines of results.jsonl in --work: a run that was killed, or whose --minutes were over,
-goes on from there. It writes reports/validation/landings-<set>.json, and --page the table of
-docs/identification.md. With --keep the episodes stay in --work: what comes after them is repeated
-without the recording, once results.jsonl is gone.
+goes on from there. It writes reports/validation/landings-<set>.json. With --keep the episodes stay
+in --work: what comes after them is repeated without the recording, once results.jsonl is gone.
 """
 
 from __future__ import annotations
@@ -45,15 +44,13 @@ from validation.campaigns.rig_scores import (
 )
 from validation.campaigns.runner import OURS, PAPER, job_of, read
 from validation.density import Calibrated, calibrated_by
-from validation.marked import block_of, fill, row
 from validation.projects import DEFAULTS, changed
-from validation.reports import plain, write_report
+from validation.reports import plain, row, write_report
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
 WORK, PULLS = Path(".checkpoints/landings"), ("paper", "informative")
 ONE_DIP = "one_dip"  # instead of plan.dips, which reports/validation/pulls.json has
 DIPS = Path("reports/validation/pulls.json")
-PAGE, README, BLOCK = Path("docs/identification.md"), Path("README.md"), "landings"
 OTHERWISE: tuple[tuple[str, dict], ...] = (  # how the first recording of a band is identified too
     ("informative", {"launched": True}),
     ("informative", {"method": PAPER}),
@@ -176,7 +173,7 @@ def figures(lines: list[dict]) -> dict:
         )
         if not good:
             continue
-        of_bands = summaries(good, "band")
+        of_bands = summaries(good)
         result[kind] = {
             "together": together(of_bands),
             "settled": [sum(bool(line["confidence"]["settled"]) for line in good), len(good)],
@@ -209,7 +206,7 @@ def together(of_bands: dict[str, dict]) -> dict:
     }
 
 
-ROWS = {  # of the page's table
+ROWS = {  # of the table
     "informative, virgin": "dips",
     "informative, virgin, one launch": "dips, one launch measured",
     "informative, virgin, the paper's method": "dips, by the paper's method",
@@ -221,8 +218,8 @@ ROWS = {  # of the page's table
 WORDS = {"bands": "the rig's three bands", "develop": "four to develop on", "sealed": "16 sealed"}
 
 
-def block(contents: dict[str, dict]) -> str:
-    """What the page has between its marks, of the reports of all sets."""
+def table(contents: dict[str, dict]) -> list[str]:
+    """The table of docs/identification.md, of the reports of all sets."""
     rows = [
         "| rubbers | recorded by | recordings | size of the bias, mean (worst) | launches inside"
         " (by bands drawn anew; least) | median width | fits that settled |",
@@ -249,11 +246,11 @@ def block(contents: dict[str, dict]) -> str:
         there, whole = contents[name]["jobs"]
         if there < whole:
             rows += ["", f"Of {words} {there} of {whole} identifications have run."]
-    return block_of(BLOCK, rows)
+    return rows
 
 
-def sentence(content: dict) -> str:
-    """What the README has between its marks, of the report of the sealed rubbers."""
+def sentence(content: dict) -> list[str]:
+    """What README says of them, of the report of the sealed rubbers."""
     means, bands = (content["figures"]["informative, virgin"][key] for key in ("together", "bands"))
     size, worst, inside, width = (
         100 * means[key] for key in ("mean_size_of_bias", "worst_bias", "coverage", "median_width")
@@ -270,7 +267,7 @@ def sentence(content: dict) -> str:
         f" intervals, which are {width:.0f} % of the distance wide. By the paper's pull they"
         f" are off by {ours:.1f} %, the paper's method by {theirs:.1f} %."
     )
-    return block_of(BLOCK, wrap(text, LINE))
+    return wrap(text, LINE)
 
 
 def report_of(name: str) -> Path:
@@ -278,16 +275,12 @@ def report_of(name: str) -> Path:
 
 
 def main() -> None:
-    parser = runner.parser(__doc__, None, WORK, page=f"{PAGE} and {README}")
+    parser = runner.parser(__doc__, None, WORK)
     parser.add_argument("set", choices=[*SETS, ONE_DIP])
     parser.add_argument("--pulls", nargs="+", choices=PULLS)
     parser.add_argument("--keep", action="store_true", help="the episodes, and take those kept")
     parser.add_argument("--recordings", type=int, default=TEN, help="of each band, at most")
     args = parser.parse_args()
-    if args.page:
-        contents = {name: read(report_of(name)) for name in SETS}
-        fill(PAGE, block(contents))
-        return fill(README, sentence(contents["sealed"]))
     if args.recordings < 1:
         raise UserError("--recordings: from 1 on")
     if args.pulls and args.set == ONE_DIP:

@@ -5,9 +5,7 @@ Recordings are made once and kept as episodes; the rig is launched after a metho
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +15,6 @@ from pipeline.base.files import replacing, write_json
 from pipeline.base.schema import read_json
 from pipeline.episode.episode import Episode
 from pipeline.identify.clamps import calibrate_clamps
-from pipeline.identify.objective.box import SearchBox
-from pipeline.identify.posterior.likelihood import opening_time
 from pipeline.identify.results.mounting import Mounting
 from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.launching.trials.spread import landing_intervals
@@ -26,9 +22,7 @@ from pipeline.params import Params
 from pipeline.simulator.model import ClampedBand
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.world import World
-from rig.physics.launch import launch
-from validation.campaigns.runner import OURS
-from validation.density import Calibrated, calibrated_by
+from validation.density import Calibrated
 
 TARGETS = np.linspace(1.525, 2.325, 9)  # m
 MAP = 17, 13  # simulated launches that tell where to seek
@@ -59,7 +53,7 @@ def built(params: Params, band: str, raw: Path, folder: Path) -> Episode:
 def calibrated_clamps(params: Params, band: str, episode: Episode, folder: Path) -> None:
     """Keep an episode in `folder`, with its clamps beside it."""
     episode.save(folder / "episode")
-    sling = ClampedBand.of(params.bands[band], params.setup, params.sling, as_rod=True)
+    sling = ClampedBand.of(params.bands[band], params.setup, params.sling)
     clamps = calibrate_clamps(params, sling, episode, workers=1)
     write_json(folder / "mounting.json", vars(clamps))
 
@@ -70,53 +64,6 @@ def sling_of(params: Params, band: str, method: str, folder: Path) -> ClampedBan
     mounting = read_json(folder / "mounting.json", Mounting) if method_params.mounting else None
     lab = params.setup, params.sling
     return ClampedBand.of(params.bands[band], *lab, mounting, law=method_params.law)
-
-
-@dataclass(frozen=True)
-class RigIdentification:
-    """What a method has found in one episode.
-
-    Attributes:
-        confidence: What `calibrated_by` says of it.
-        theta: Parameters by name.
-        seconds: Of the identification.
-    """
-
-    outcome: Calibrated
-    confidence: dict
-    theta: dict[str, float]
-    seconds: float
-
-
-def identified(
-    params: Params, band: str, method: str, seed: int, folder: Path, recorded_pads: bool = False
-) -> RigIdentification:
-    """Identify the episode in `folder` with a seed of the search. Raises UserError.
-
-    Args:
-        recorded_pads: Every method has the pads open as fast as the recorded force fell; else only
-            the density has, and searches have the lab's nominal time.
-    """
-    optimizer = params.optimizer.model_copy(update={"seed": seed})
-    params = params.model_copy(update={"optimizer": optimizer})
-    sling, start = sling_of(params, band, method, folder), time.perf_counter()
-    episode = Episode.load(folder / "episode")
-    if recorded_pads:
-        friction = params.methods[OURS].fixed["dynamic_friction"]
-        sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
-    outcome, confidence = calibrated_by(params, method, sling, [episode])
-    seconds, names = time.perf_counter() - start, SearchBox.of_method(params, method).names
-    theta = {name: outcome.identified[name] for name in names}
-    return RigIdentification(outcome, confidence, theta, seconds)
-
-
-def errors_on_the_rig(band: str, params: Params, draws: np.ndarray) -> np.ndarray:
-    """Landing less target [m] of draws (T, 2), launched on the rig without errors; NaN: none."""
-    landing = [
-        np.nan if np.isnan(draw).any() else launch(band, params, tuple(draw), None).landing_y
-        for draw in draws
-    ]
-    return np.array(landing) - params.trials.targets
 
 
 def aimed(outcome: Calibrated, params: Params, targets: Sequence[float] = TARGETS) -> np.ndarray:
@@ -175,15 +122,14 @@ def saved(params: Params, path: Path) -> Path:
 
 
 def summary(results: list[dict]) -> dict:
-    """Summarise results at TARGETS, or their own: misses [m]; error, coverage, width as shares."""
-    targets = np.array([result.get("targets", TARGETS) for result in results])
+    """Summarise results at TARGETS: misses [m]; error, coverage, width as shares."""
     error, miss, low, high = (
         np.array([result[name] for result in results], float)
         for name in ("error", "miss", "low", "high")
     )
     finite = np.isfinite(low) & np.isfinite(miss)
     inside = np.array([result["inside"] for result in results])[finite]
-    width = ((high - low) / targets)[finite]
+    width = ((high - low) / TARGETS)[finite]
     return {
         "bias": np.nanmean(error, axis=1),
         "mean_bias": np.nanmean(error),
@@ -195,9 +141,9 @@ def summary(results: list[dict]) -> dict:
     }
 
 
-def summaries(lines: list[dict], unit: str) -> dict[str, dict]:
-    """Summarise lines of results with "scores" by what each has as `unit`, such as its band."""
+def summaries(lines: list[dict]) -> dict[str, dict]:
+    """Summarise lines of results with "scores" by band."""
     return {
-        str(name): summary([line["scores"] for line in lines if line[unit] == name])
-        for name in dict.fromkeys(line[unit] for line in lines)
+        band: summary([line["scores"] for line in lines if line["band"] == band])
+        for band in dict.fromkeys(line["band"] for line in lines)
     }

@@ -14,14 +14,12 @@ from concurrent.futures import as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import fields
 from functools import partial
-from multiprocessing import active_children, get_context
-from multiprocessing.queues import SimpleQueue
+from multiprocessing import active_children
 from pathlib import Path
 from threading import Lock
 from typing import TypeVar
 
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
 from pipeline.base.layout import made
 from pipeline.base.machine import cores
 from pipeline.base.pool import Pool
@@ -64,10 +62,6 @@ class ResultLines:
         there = self.of(type(jobs[0])) if jobs else {}
         return [there[job] for job in jobs if job in there]
 
-    def where(self, **values: object) -> list[Result]:
-        """Lines with these values."""
-        return [line for line in self.lines if all(line[name] == v for name, v in values.items())]
-
 
 def job_of(line: Result, kind: type[Job]) -> Job:
     """What a line of results is of."""
@@ -86,22 +80,6 @@ def single_threaded() -> Iterator[None]:
             os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
-def take_core(free: SimpleQueue) -> None:
-    """Keep this process on one core, so that no library starts a thread for each of the others."""
-    os.sched_setaffinity(0, {free.get()})
-
-
-def pool_of(workers: int) -> Pool:
-    """Processes with a core each, where this one may use as many; else wherever they run."""
-    ours = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
-    if workers > len(ours):
-        return Pool(workers=workers)
-    free = get_context("spawn").SimpleQueue()
-    for core in ours[:workers]:
-        free.put(core)
-    return Pool(take_core, free, workers=workers)
-
-
 def each(
     work: Callable[[Job], object], jobs: Iterable[Job], workers: int, minutes: float = 1e4
 ) -> Iterator[object]:
@@ -110,7 +88,7 @@ def each(
     Ends early, and says so, when the time is over: what is under way then is lost. Raises what
     `work` raises.
     """
-    with single_threaded(), pool_of(workers) as pool:
+    with single_threaded(), Pool(workers=workers) as pool:
         waiting = {pool.submit(work, job): job for job in jobs}
         try:
             for count, done in enumerate(as_completed(waiting, timeout=60 * minutes), 1):
@@ -148,13 +126,6 @@ def result_of(job: object, work: Callable[[object], Mapping], **more: object) ->
     return plain(vars(job) | more | done)
 
 
-def made_once(path: Path, make: Callable[[], object]):
-    """The content of a JSON file, which is made where it is missing."""
-    if not path.exists():
-        write_json(path, make())
-    return read(path)
-
-
 def read(path: Path):
     """The content of a JSON file. Raises NotMade."""
     return json.loads(made(path).read_text(encoding="utf-8"))
@@ -164,41 +135,24 @@ def parser(
     doc: str | None,
     report: Path | None,
     work: Path | None = None,
-    *,
-    many: bool = True,
-    page: Path | str | None = None,
-    orange: bool = False,
 ) -> argparse.ArgumentParser:
     """A campaign's arguments.
 
     Args:
         doc: Of the script; its first line says what it is for.
         report: Default of --report; None: by what is asked for.
-        work: Default of --work, the folder of what is kept.
-        many: With --workers, --minutes and --report-only, for many jobs in that folder.
-        page: With --page, which writes into this one alone.
-        orange: With --orange, the folder of recordings that this project did not make.
+        work: Default of --work, the folder of what is kept of many jobs; None: no such options.
     """
     options = argparse.ArgumentParser(description=(doc or "").partition("\n")[0])
     default = f"file (default: {report or 'by what is asked for'})"
     options.add_argument("--report", type=Path, default=report, help=default)
     if work is not None:
         options.add_argument("--work", type=Path, default=work, help=f"folder (default: {work})")
-    if work is not None and many:
         workers, end = "processes (default: cores)", "then it ends; the same command goes on"
         options.add_argument("--workers", type=int, default=cores(), help=workers)
         options.add_argument("--minutes", type=float, default=1e4, help=end)
         options.add_argument("--report-only", action="store_true", help="of what is there")
-    if page is not None:
-        options.add_argument("--page", action="store_true", help=f"only write into {page}")
-    if orange:
-        options.add_argument("--orange", type=Path, help="folder of its recordings and landings")
     return options
-
-
-def orange_argument(args: argparse.Namespace) -> str:
-    """What a report's command says of --orange, whose folder is another one elsewhere."""
-    return "--orange FOLDER" if args.orange else ""
 
 
 def prepare(args: argparse.Namespace, work: Callable[[Job], object], jobs: Sequence[Job]) -> None:
@@ -219,11 +173,7 @@ def results_of(
     results = ResultLines(args.work / "results.jsonl")
     if not args.report_only:
         run(work, jobs, results, args.workers, args.minutes, **more)
-    return expect(results.among(jobs), args.work)
-
-
-def expect(results: Sequence[Job], work: Path) -> Sequence[Job]:
-    """Some results, of which there is one at least. Raises UserError."""
-    if not results:
-        raise UserError(f"{work}: holds no result of these jobs yet")
-    return results
+    found = results.among(jobs)
+    if not found:
+        raise UserError(f"{args.work}: holds no result of these jobs yet")
+    return found

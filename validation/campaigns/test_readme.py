@@ -5,7 +5,7 @@ import re
 import pytest
 
 from pipeline.base.code import ROOT
-from validation.marked import CODE_BLOCK
+from validation.pages import CODE_BLOCK
 from validation.projects import ProjectCopy, copy_project
 
 pytestmark = pytest.mark.validation

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
-from pipeline.simulator.model import ROD, TETRAHEDRA, ClampedBand
+from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.engines import mujoco_flex
@@ -43,9 +43,8 @@ its path and the band does not slip in it; the projectile is a mass at the middl
 rest, let go at once and gone at the first pull; there is no air. What is left of a difference while
 the band is slack, and where it becomes taut, is mostly the bending of coarse tetrahedra: it is
 several times too stiff, the more so the closer Poisson's ratio is to 0.5, and finer sections come
-closer to our figures. With `sling.mesh: tetrahedra` both engines have the very same mesh, and what
-is left is integrator and solver."""
-SAME_MESH = {"edges": 52, "grading": 1.0}  # of `tet_edges`, evenly spaced
+closer to our figures."""
+SAME_MESH = {"edges": 52, "grading": 1.0}  # of PhysX's bands, evenly spaced
 
 
 @dataclass(frozen=True)
@@ -145,23 +144,21 @@ def pull_checks(result: EnginePull, title: str, fine: bool) -> list[Measure]:
     ]
 
 
-def launch_check(
-    bench: Bench, cases=LAUNCHES, step: float = 2.5e-4, title: str = "", **mesh
-) -> Measure:
+def launch_check(bench: Bench, cases=LAUNCHES, step: float = 2.5e-4) -> Measure:
     """The largest difference of the landings of `cases`, as listed in LAUNCHES."""
     sling, setup = sling_of(bench), setup_of(bench)
     thetas = np.array([[young, poisson, d, 1.0, 1.0] for young, poisson, d, _ in cases])
     draws = np.array([draw for *_, draw in cases])
     ours = launch(sling, setup, damped(thetas), draws, device=bench.device)
     theirs = [
-        mujoco_flex.launch(sling, setup, theta, draw, step, **mesh)
+        mujoco_flex.launch(sling, setup, theta, draw, step)
         for theta, draw in zip(thetas, draws, strict=True)
     ]
     landing = 100 * (np.array([flight.landing_y for flight in theirs]) / ours.landing_y - 1)
     speed = 100 * (np.array([flight.speed for flight in theirs]) / ours.speed - 1)
     hold = 100 * (np.array([flight.hold_force for flight in theirs]) / ours.hold_force - 1)
     return Measure(
-        f"landing of {len(cases)} launches, the largest difference{title}",
+        f"landing of {len(cases)} launches, the largest difference",
         "MuJoCo 3D flex",
         float(np.abs(landing).max()),
         "%",
@@ -177,18 +174,14 @@ def section(bench: Bench) -> Theme:
     Raises:
         UserError: MuJoCo is not installed.
     """
-    rod, same = _with_mesh(bench, ROD, bench.device), solid(bench)
     checks, results = [], []
     for poisson, rings, fine in PULLS:
         theta = THETA.copy()
         theta[1] = poisson
-        results.append(pull(rod, theta, rings=rings))
+        results.append(pull(bench, theta, rings=rings))
         title = f"Poisson's ratio {poisson:.2f}, {900 * rings**2} tetrahedra"
         checks += pull_checks(results[-1], title, fine)
-    checks.append(launch_check(rod))
-    title = ", the same 936 tetrahedra in both"
-    checks += pull_checks(pull(same, theta, **SAME_MESH), f"Poisson's ratio 0.45{title}", True)
-    checks.append(launch_check(same, title=title, **SAME_MESH))
+    checks.append(launch_check(bench))
     pictures = {}
     if bench.figures:
         draw(results[1], bench.figures / "mujoco.png")
@@ -226,17 +219,6 @@ def draw(result: EnginePull, path) -> None:
     side.legend(ncols=2, loc="upper left")
     figure.savefig(path, dpi=110)
     plt.close(figure)
-
-
-def solid(bench: Bench) -> Bench:
-    """The same with our own tetrahedra in place of the rod; they run on the CPU alone."""
-    return _with_mesh(bench, TETRAHEDRA, "cpu")
-
-
-def _with_mesh(bench: Bench, mesh: str, device: str) -> Bench:
-    resolution = bench.params.sling.model_copy(update={"mesh": mesh})
-    params = bench.params.model_copy(update={"sling": resolution})
-    return replace(bench, params=params, device=device)
 
 
 def sling_of(bench: Bench) -> ClampedBand:

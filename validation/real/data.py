@@ -88,15 +88,3 @@ def acrylic(folder: Path) -> list[Curve]:
             table = np.array([[float(cell) for cell in row] for row in list(csv.reader(lines))[1:]])
         curves.append(Curve(file.stem, table[:, 1], table[:, 2], table[:, 0]))
     return curves
-
-
-def ropes(folder: Path) -> dict[str, list[np.ndarray]]:
-    """Read the runs of each rope in the order of their names: markers (T, M, 3) [m].
-
-    100 frames a second. Two robots move the ends; Chen et al., CoRL 2024, `deform_dlo_mocap`.
-    """
-    runs: dict[str, list[np.ndarray]] = {}
-    for file in sorted((folder / "deform_dlo_mocap").glob("DLO*.npy")):
-        run = np.load(file, allow_pickle=False).astype(float)
-        runs.setdefault(file.stem.partition("_")[0], []).append(run.transpose(0, 2, 1))
-    return runs

@@ -11,7 +11,6 @@ from pipeline.simulator.rubber import uniaxial
 from validation.real import data
 
 COLUMNS = 5
-APART = 0.55  # m, from one time to the next
 
 
 def draw(folder: Path, source: Path, content: dict) -> None:
@@ -37,38 +36,3 @@ def draw(folder: Path, source: Path, content: dict) -> None:
     figure.tight_layout()
     figure.savefig(folder / "silicones.png", dpi=110, metadata={"Software": None})
     plt.close(figure)
-
-
-def draw_ropes(
-    folder: Path, runs: dict[str, np.ndarray], summary: dict[str, np.ndarray], content: dict
-) -> None:
-    """ropes.png: predicted runs (T, M, 3) at four times, seen from the side, and their error."""
-    folder.mkdir(parents=True, exist_ok=True)
-    figure, rows = plt.subplots(2, len(runs), figsize=(11, 5), height_ratios=(2, 1), sharey="row")
-    for name, shape, error in zip(runs, *rows, strict=True):
-        run, other = runs[name], summary[name]
-        for k, frame in enumerate(np.linspace(0, len(run) - 1, 5).astype(int)[1:]):
-            side, top = _side(run[frame]), run[frame, [0, -1], 2].max() + APART * k
-            for markers, style in ((run, "o-"), (other, "-")):
-                place = (markers[frame] - run[frame, 0]) @ side
-                look = {"color": "0.6" if markers is run else "tab:blue", "lw": 1, "ms": 2}
-                shape.plot(place, markers[frame, :, 2] - top, style, **look)
-        prediction = content["ropes"][name]["predicted_run"]
-        shape.set_title(f"{name}: {prediction['rms_mm']:.0f} mm", fontsize=8)
-        shape.set_aspect("equal")
-        gaps = np.linalg.norm(other - run, axis=2)[:, 2:-2]
-        error.plot(np.arange(len(run)) / 100, 1e3 * np.sqrt((gaps**2).mean(1)), linewidth=1)
-        for axis in (shape, error):
-            axis.tick_params(labelsize=6)
-        error.set_xlabel("time [s]", fontsize=7)
-    rows[0, 0].set_ylabel(f"height, each time {APART} m lower [m]", fontsize=7)
-    rows[1, 0].set_ylabel("rms [mm]", fontsize=7)
-    figure.tight_layout()
-    figure.savefig(folder / "ropes.png", dpi=110, metadata={"Software": None})
-    plt.close(figure)
-
-
-def _side(markers: np.ndarray) -> np.ndarray:
-    """Level unit vector from one end to the other, of markers (M, 3)."""
-    way = (markers[-1] - markers[0]) * [1, 1, 0]
-    return way / np.linalg.norm(way)

@@ -42,7 +42,7 @@ def band_of(bench: Bench) -> ClampedBand:
     """The first band of params.yaml as a solid rod of the default resolution, without air."""
     params = bench.params
     band = params.bands[next(iter(params.bands))]
-    sling = ClampedBand.of(band, params.setup, params.sling, as_rod=True)
+    sling = ClampedBand.of(band, params.setup, params.sling)
     return replace(sling, air_density=0.0)
 
 

@@ -22,7 +22,6 @@ from validation.simulator import (
     agreement,
     at_rest,
     damping,
-    elements,
     energy,
     five_parameters,
     free_motion,
@@ -38,7 +37,7 @@ HEAD = """\
 `sling verify` writes this page: {met} of {limited} limits are kept{missed}. Figures without a \
 limit are stated for what they tell. [{name}.json]({name}.json) keeps figures and environment.
 
-**What is solved.** A band is by default an extensible director rod: each edge has a deformation \
+**What is solved.** A band is an extensible director rod: each edge has a deformation \
 gradient F = [g a b] of its stretch and its section, with the stable neo-Hookean law without its \
 logarithm (Smith, de Goes and Kim 2018), W = μ/2 (|F|² − 3) − μ (J − 1) + λ/2 (J − 1)², J = det F; \
 λ is the first Lamé parameter plus μ, so that E and ν are the small-strain ones. Joints between \
@@ -46,7 +45,7 @@ edges bend with E I and twist with G J of the round section. Viscous stress is d
 the elastic stress, its shape part times s. Each step, of second order (BDF2), is solved \
 by Newton's method on the whole band.
 
-Device {device}; simulator {simulator}, a digest of pipeline/simulator.
+Device {device}; commit {commit}.
 """
 SECTIONS: dict[str, Callable[..., Theme]] = {
     "at rest": at_rest.section,
@@ -55,7 +54,6 @@ SECTIONS: dict[str, Callable[..., Theme]] = {
     "free motion": free_motion.section,
     "energy": energy.section,
     "the five parameters": five_parameters.section,
-    "rod and tetrahedra": elements.section,
 }
 CAMPAIGNS = {
     "launches": launching.section,
@@ -106,7 +104,7 @@ def verify(
             with replacing(root / "reports" / name / picture.name) as temporary:
                 temporary.write_bytes(picture.read_bytes())
     provenance = environment(device, f"sling verify --device {device}")
-    retained = ("device",) + (() if device == "cpu" else ("device_name",))
+    retained = ("device", "commit") + (() if device == "cpu" else ("device_name",))
     context = {name: provenance[name] for name in retained}
     write_text(root / f"reports/{name}.md", markdown(sections, context, name))
     write_json(root / f"reports/{name}.json", context | {"sections": list(map(_entry, sections))})
@@ -136,7 +134,7 @@ def markdown(sections: list[Theme], context: dict, name: str) -> str:
         missed=f", {missed} not" if missed else "",
         name=name,
         device=", ".join(filter(None, (context["device"], context.get("device_name")))),
-        simulator=context["simulator"],
+        commit=context["commit"],
     )
     return "\n".join([head, *(_part(section, name) for section in sections)])
 

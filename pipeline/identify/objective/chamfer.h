@@ -1,6 +1,6 @@
 
-// Mean distances between a frame's points and the simulated tube. After points.h; wants the macros SAMPLES (an edge)
-// and BOTH (directions) too.
+// Mean distances between a frame's points and the simulated tube. After points.h; wants the macro SAMPLES (an edge)
+// too.
 
 const float* rest = rest_edges.data;
 float rest_length = 0.0f;
@@ -31,7 +31,6 @@ for (int e = 0; e < EDGES; e += LANES) {
   }
   PUT(tube[RADIUS] + e, thick);
   PUT(tube[OFF] + e, 1e-5f * (ROOT(length2) + thick));
-#if BOTH
   // points on the ridge of the tube that faces the camera
   real p[SAMPLES][3], reach2 = zero;
   for (int k = 0; k < SAMPLES; ++k) {
@@ -53,7 +52,6 @@ for (int e = 0; e < EDGES; e += LANES) {
   }
   PUT(tube[REACH] + e, ROOT(reach2) * MORE);
   for (int k = 0; k < SAMPLES; ++k) PUT(tube[NEAREST + k] + e, zero + FAR);
-#endif
 }
 SYNC();
 
@@ -103,9 +101,7 @@ for (int g = first_group; g < last_group; ++g) {
   }
 }
 const float measured = sum(total) / sum(count);
-float simulated = 0.0f;
 
-#if BOTH
 // simulated to measured, 64 blocks at once: which can be nearest to the samples of an edge, by some ball that
 // is near the middle one of them; then each sample to the nearest point
 SHARED unsigned long long within[EDGES];
@@ -159,7 +155,6 @@ SYNC();
 real shares = zero;  // each sample's for its edge's
 for (int e = 0; e < EDGES; e += LANES)
   for (int k = 0; k < SAMPLES; ++k) shares += ROOT(GET(tube[NEAREST + k] + e)) * taken(rest + e, 1, EDGES - e);
-simulated = sum(shares) / (rest_length * (float)SAMPLES);
-#endif
+const float simulated = sum(shares) / (rest_length * (float)SAMPLES);
 if (lane == 0) { errors.data[2 * (size_t)item] = measured; errors.data[2 * (size_t)item + 1] = simulated; }
 

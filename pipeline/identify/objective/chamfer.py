@@ -31,7 +31,6 @@ class Chamfer:
         *,
         radius: float,
         rest_length: float | np.ndarray,
-        symmetric: bool = True,
         culled: bool = True,
     ) -> None:
         """Keep the clouds, and from their first use on a device a copy there.
@@ -42,12 +41,11 @@ class Chamfer:
             radius, rest_length: Of the unstretched band [m]; it thins where it is stretched, as
                 an incompressible body does. One length is shared evenly by the edges; an array
                 gives each edge its own.
-            symmetric: The mean of both directions; else measured to simulated alone.
             culled: Skip what cannot be nearest; without, the same bits come later.
         """
         self.camera = np.asarray(camera, float)
         self.radius, self.rest_length = float(radius), np.asarray(rest_length, np.float32)
-        self.symmetric, self.culled, self.clouds = symmetric, culled, clouds
+        self.culled, self.clouds = culled, clouds
         self.frames = len(clouds)
         self._packed: dict[str, list[wp.array]] = {}
         self._lock = threading.Lock()
@@ -62,7 +60,7 @@ class Chamfer:
         """
         count, frames = center_line.shape[:2]
         both = self.errors(center_line, device).numpy().reshape(count, frames, 2).astype(float)
-        return both.mean(axis=2) if self.symmetric else both[:, :, 0]
+        return both.mean(axis=2)
 
     def errors(self, center_line: np.ndarray | wp.array, device: str) -> wp.array:
         """Distances in both directions [m], as Warp's float32 (N * K * 2,) on that device."""
@@ -98,7 +96,7 @@ class Chamfer:
     def _kernel(self, edges: int, lanes: int) -> tuple[wp.Kernel, type]:
         from pipeline.identify.objective.kernel import chamfer_kernel
 
-        return chamfer_kernel(edges, SAMPLES, self.symmetric, lanes, self.culled)
+        return chamfer_kernel(edges, SAMPLES, lanes, self.culled)
 
 
 class CloudDistance(Chamfer):

@@ -66,7 +66,6 @@ class DeviceTerms:
             setattr(arrays, name, values)
         arrays.force, arrays.errors = force, self._chamfer.errors(line, device)
         arrays.samples, arrays.frames = len(matrix.indptr) - 1, self._chamfer.frames
-        arrays.both = int(self._chamfer.symmetric)
         filtered = count * 3 * arrays.samples
         arrays.filtered = empty(filtered, wp.float64, device)
         arrays.terms = terms = empty(count * 3, wp.float64, device)

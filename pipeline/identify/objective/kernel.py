@@ -14,15 +14,15 @@ from pipeline.base.native import built_once, text_of
 
 @built_once
 def chamfer_kernel(
-    edges: int, samples: int, both: bool, lanes: int, culled: bool = True
+    edges: int, samples: int, lanes: int, culled: bool = True
 ) -> tuple[wp.Kernel, type]:
     """Compile chamfer.h for a mesh; Warp keeps the binary in its cache.
 
     Returns:
         The kernel, and the structure of arrays that it takes.
     """
-    macros = {"SAMPLES": samples, "BOTH": int(both)}
-    return _cloud_kernel("chamfer.h", EDGES=edges, CULLED=int(culled), CPU_LANES=lanes, **macros)
+    macros = {"EDGES": edges, "SAMPLES": samples, "CULLED": int(culled), "CPU_LANES": lanes}
+    return _cloud_kernel("chamfer.h", **macros)
 
 
 @built_once
@@ -83,7 +83,6 @@ def terms_kernel(window: int) -> tuple[wp.Kernel, type]:
         samples: int
         sample_weights: doubles
         errors: wp.array(dtype=wp.float32)
-        both: int
         frames: int
         frame_weights: doubles
         filtered: doubles

@@ -5,7 +5,7 @@
     work   | sum of trapezoids of (f_real - f_sim) . v over the whole episode |         [J]
 
 They are the paper's, with its constants read as 1/(T 1 cm), 1/(T 1 N) and 1/(1 J). docs/method.md
-says more. Blocks of the recording can be held out: they count in no term, but in `residuals`.
+says more.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.base.errors import UserError
-from pipeline.episode.blocks import held_out_blocks, reach, within
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import cutoff_hz, recording_matrix
 from pipeline.identify.objective.chamfer import Chamfer, CloudDistance
@@ -34,13 +33,7 @@ LOCK = threading.Lock()  # while a filter is made, which takes a second
 
 
 class EpisodeLoss:
-    """The loss of one episode, for batches of rollouts.
-
-    Attributes:
-        fitted_samples, held_samples: Which samples count in the terms and which do not, (T,) bool;
-            those of neither are guards.
-        fitted_frames, held_frames: The same of the camera frames, shape (K,).
-    """
+    """The loss of one episode, for batches of rollouts."""
 
     def __init__(
         self,
@@ -52,8 +45,6 @@ class EpisodeLoss:
         cutoff: float,
         median_window: int = 7,
         chamfer: str = "symmetric",
-        late_decay: float | None = None,
-        held_out: np.ndarray | None = None,
     ) -> None:
         """Prepare the recorded side.
 
@@ -62,13 +53,8 @@ class EpisodeLoss:
             weights: Of each of TERMS; a term that weighs nothing is still computed.
             cutoff: Of the low-pass that the recorded force went through [Hz].
             median_window: Samples of the median filter on forces and velocity, odd.
-            chamfer: "symmetric": between the cloud and the tube both ways; "measured": measured to
-                simulated alone; "clouds": between two clouds, as the paper prints it.
-            late_decay: By which the geometry's weight falls after the release [1/sample], as
-                1 / (1 + exp(late_decay (t - t_open))), which the paper's source has commented out;
-                None: all frames weigh the same.
-            held_out: Begin and end [s] of blocks that are not fitted, shape (B, 2). Samples nearer
-                to them than the force's filters reach count nowhere; clouds pass no filter.
+            chamfer: "symmetric": between the cloud and the tube both ways; "clouds": between two
+                clouds, as the paper prints it.
 
         Raises:
             UserError: No cloud has points.
@@ -81,62 +67,41 @@ class EpisodeLoss:
         self.force = self.smooth(episode.force)
         distance = CloudDistance if chamfer == "clouds" else Chamfer
         self.chamfer = distance(
-            episode.clouds,
-            episode.camera,
-            radius=radius,
-            rest_length=rest_length,
-            symmetric=chamfer != "measured",
+            episode.clouds, episode.camera, radius=radius, rest_length=rest_length
         )
-        blocks = np.zeros((0, 2)) if held_out is None else np.asarray(held_out, float)
-        guard = reach(self.period, cutoff, median_window)
-        seen = np.array([len(cloud) > 0 for cloud in episode.clouds])
-        self.fitted_samples = ~within(self.time, blocks, guard)
-        self.held_samples = within(self.time, blocks)
-        self.fitted_frames = ~within(episode.cloud_time, blocks) & seen
-        self.frame_weights = np.ones(len(seen))
-        if late_decay is not None:  # a tanh, which does not overflow
-            late = (episode.cloud_time - episode.release_time) / self.period
-            self.frame_weights = (1 - np.tanh(late_decay * late / 2)) / 2
-        self.held_frames = within(episode.cloud_time, blocks) & seen
-        pull = np.array([[episode.grasp_time, episode.release_time - guard]])
-        self._pull = within(self.time, pull), within(episode.cloud_time, pull)
+        self._seen = np.array([len(cloud) > 0 for cloud in episode.clouds])
+        if not self._seen.any():
+            raise UserError(f"episode of {episode.band}: no camera frame shows the band")
+        trapezoids = np.full(len(self.time), self.period)
+        trapezoids[[0, -1]] /= 2
         self._on_device = DeviceTerms(
             self.chamfer,
             force=self.force,
             velocity=self.velocity,
             window=median_window,
-            sample_weights=np.stack([_mean(self.fitted_samples), self._trapezoids()]),
-            frame_weights=100 * _mean(self.fitted_frames) * self.frame_weights,
+            sample_weights=np.stack([np.full(len(self.time), 1 / len(self.time)), trapezoids]),
+            frame_weights=100 * (self._seen / self._seen.sum()),
         )
-        if not self.fitted_frames.any():
-            raise UserError(f"episode of {episode.band}: no camera frame shows the band")
 
     @classmethod
     def of(cls, params: Params, method: str, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
         """Make it from params.yaml's `loss`, `force` and `methods.<method>`."""
-        cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
-        held = params.loss.held_out
-        guard = reach(episode.sample_period, cutoff, params.loss.median_window)
-        return cls(
-            episode,
-            radius=sling.radius,
-            rest_length=sling.edge_lengths,
-            weights=dict(params.methods[method].weights),
-            cutoff=cutoff,
-            median_window=params.loss.median_window,
-            chamfer=params.loss.chamfer,
-            late_decay=params.loss.late_decay,
-            held_out=held_out_blocks(episode, held.blocks, held.length, guard),
-        )
+        return cls._weighed(params, dict(params.methods[method].weights), episode, sling)
 
     @classmethod
     def plain(cls, params: Params, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
         """Geometry and force alone, for a part of an episode."""
+        return cls._weighed(params, {"geom": 1.0, "force": 1.0, "work": 0.0}, episode, sling)
+
+    @classmethod
+    def _weighed(
+        cls, params: Params, weights: dict[str, float], episode: Episode, sling: ClampedBand
+    ) -> EpisodeLoss:
         return cls(
             episode,
             radius=sling.radius,
             rest_length=sling.edge_lengths,
-            weights={"geom": 1.0, "force": 1.0, "work": 0.0},
+            weights=weights,
             cutoff=cutoff_hz(params.force.cutoff, params.force.cutoff_unit),
             median_window=params.loss.median_window,
             chamfer=params.loss.chamfer,
@@ -153,30 +118,12 @@ class EpisodeLoss:
             return dict(zip(TERMS, on_device.T, strict=True))
         gap, frames = self._gap(rollouts), self.frames(rollouts)
         power = np.einsum("ntc,tc->nt", gap, self.velocity)
-        both = self.fitted_samples[:-1] & self.fitted_samples[1:]  # ends of a trapezoid
-        work = (power[:, :-1] + power[:, 1:]).compress(both, axis=1).sum(axis=1)
+        work = (power[:, :-1] + power[:, 1:]).sum(axis=1)
         return {
-            "geom": self._centimetres(frames * self.frame_weights, self.fitted_frames),
-            "force": self._newtons(gap, self.fitted_samples),
+            # not frames[:, seen]: its order in memory, and so the sum's, would depend on N
+            "geom": 100 * frames.compress(self._seen, axis=1).mean(axis=1),
+            "force": np.linalg.norm(gap, axis=2).mean(axis=1),
             "work": np.abs(work) / 2 * self.period,
-        }
-
-    def residuals(self, rollouts: Rollouts) -> dict[str, dict[str, np.ndarray]]:
-        """Fitted against held-out between grasp and release: `force` [N] and `cloud` [cm], (N,).
-
-        NaN where nothing is held out.
-        """
-        gap, frames = self._gap(rollouts), self.frames(rollouts)
-        samples, pictures = self._pull
-        return {
-            "force": {
-                "fitted": self._newtons(gap, samples & self.fitted_samples),
-                "held_out": self._newtons(gap, self.held_samples),
-            },
-            "cloud": {
-                "fitted": self._centimetres(frames, pictures & self.fitted_frames),
-                "held_out": self._centimetres(frames, self.held_frames),
-            },
         }
 
     def total(self, terms: dict[str, np.ndarray]) -> np.ndarray:
@@ -208,22 +155,6 @@ class EpisodeLoss:
         """Measured less simulated force [N], shape (N, T, 3)."""
         return self.force - self.smooth(self.filtered(rollouts))
 
-    def _trapezoids(self) -> np.ndarray:
-        """What each sample's power adds to the work [s], shape (T,)."""
-        both = self.fitted_samples[:-1] & self.fitted_samples[1:]
-        return self.period / 2 * (np.append(both, False) + np.append(False, both).astype(float))
-
-    def _newtons(self, gap: np.ndarray, samples: np.ndarray) -> np.ndarray:
-        size = np.linalg.norm(gap, axis=2).compress(samples, axis=1)
-        return size.mean(axis=1) if samples.any() else np.full(len(gap), np.nan)
-
-    def _centimetres(self, frames: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        nothing = np.full(len(frames), np.nan)
-        if not chosen.any():
-            return nothing
-        # not frames[:, chosen]: its order in memory, and so the sum's, would depend on N
-        return 100 * frames.compress(chosen, axis=1).mean(axis=1)
-
     def _filter(self, times: np.ndarray) -> csr_array:
         """Filter of forces at simulated times (S,), as the recorded force was filtered."""
         start = float(self.time[0] - self.period / 2)
@@ -231,11 +162,6 @@ class EpisodeLoss:
             return _recording_filter(
                 times.tobytes(), self.cutoff, start, self.period, len(self.time)
             )
-
-
-def _mean(chosen: np.ndarray) -> np.ndarray:
-    """Weights of a mean over what is chosen, shape (T,); all 0 where nothing is."""
-    return chosen / max(chosen.sum(), 1)
 
 
 @lru_cache(maxsize=128)  # shared by all losses of an episode, such as the report's replays

@@ -64,7 +64,7 @@ for (int t = lane; t < samples; t += THREADS) {
 }
 for (int k = lane; k < frames; k += THREADS) {
   const float* pair = errors.data + ((size_t)item * frames + k) * 2;
-  const double error = both ? ((double)pair[0] + (double)pair[1]) / 2.0 : (double)pair[0];
+  const double error = ((double)pair[0] + (double)pair[1]) / 2.0;
   if (frame_weights.data[k] != 0.0) geom += frame_weights.data[k] * error;
 }
 newtons = sum(newtons); joules = sum(joules); geom = sum(geom);

@@ -21,12 +21,10 @@ class MethodReplay:
     Attributes:
         force: On the gripper at the episode's samples, filtered as the measured one, shape (T, 3).
         distance: Of each frame's cloud from the simulated band [m], shape (K,); NaN without points.
-        residuals: "force" [N] and "cloud" [cm] during the pull, each "fitted" and "held_out".
     """
 
     force: np.ndarray
     distance: np.ndarray
-    residuals: dict[str, dict[str, float]]
 
 
 def replay_method(
@@ -42,11 +40,4 @@ def replay_method(
     done = replay(sling, episode, parameters_of(theta), params.force)
     if failure := done.rollouts.failure[0]:
         raise NotMade(Layout().theta(band, method), failure)
-    return MethodReplay(
-        force=done.force[0],
-        distance=loss.frames(done.rollouts)[0],
-        residuals={
-            kind: {part: float(value[0]) for part, value in parts.items()}
-            for kind, parts in loss.residuals(done.rollouts).items()
-        },
-    )
+    return MethodReplay(done.force[0], loss.frames(done.rollouts)[0])

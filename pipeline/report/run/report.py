@@ -80,11 +80,11 @@ class Report:
 
 
 def _replays(params: Params, results: Results, band: str) -> dict[str, MethodReplay]:
-    """Replays of the methods that are drawn; of all where held-out data are to be compared."""
+    """Replays of the methods that are drawn."""
     recorded, methods = results.episodes[band], results.methods[band]
     some = drawn(params.run.methods)
     return {
         method: replay_method(params, band, method, recorded, methods[method].theta)
         for method in methods
-        if method in some or params.loss.held_out.blocks
+        if method in some
     }

@@ -16,27 +16,12 @@ def test_a_perfect_simulation_costs_nothing_and_one_unit_reads_one() -> None:
     for name in ("geom", "force", "work"):
         np.testing.assert_allclose(terms[name], np.zeros(3), atol=1e-2)
     lines = toy.rollouts(episode, shift=(0, 0, -0.01))
-    for chamfer in ("symmetric", "measured"):
-        terms = loss_of(episode, chamfer=chamfer).terms(lines)
-        assert terms["geom"][0] == pytest.approx(1.0, abs=0.01)
+    assert loss_of(episode).terms(lines)["geom"][0] == pytest.approx(1.0, abs=0.01)
     for force in ((1, 0, 0), (0, -1, 0), (0.6, 0, 0.8)):
         terms = loss_of(episode).terms(toy.rollouts(episode, force=force))
         assert terms["force"][0] == pytest.approx(1.0, abs=1e-9)
         duration = (len(episode.time) - 1) * toy.PERIOD
         assert terms["work"][0] == pytest.approx(abs(force[1]) * 0.1 * duration, abs=1e-9)
-
-
-def test_late_pictures_weigh_less_where_asked() -> None:
-    """1 cm off everywhere: the mean weight, by the formula."""
-    episode = toy.episode(samples=200, release_time=3.0)
-    shifted = toy.rollouts(episode, shift=(0, 0, -0.01))
-    late = (episode.cloud_time - 3.0) / toy.PERIOD
-    expected = np.mean(1 / (1 + np.exp(0.5 * late)))
-    all_of_it, part = (
-        loss_of(episode, late_decay=decay).terms(shifted)["geom"][0] for decay in (None, 0.5)
-    )
-    assert part / all_of_it == pytest.approx(expected, rel=1e-3)
-    assert 0.4 < expected < 0.6
 
 
 def test_work_cancels_where_force_does_not() -> None:
@@ -97,45 +82,6 @@ def test_a_broken_rollout_breaks_no_other() -> None:
     np.testing.assert_array_equal(np.isfinite(loss.total(terms)), [True, False])
 
 
-BLOCKS = np.array([[0.45, 0.75]])  # of the toy's pull, from 0.3 to 1.2 s
-
-
-def test_a_held_out_block_counts_in_its_own_residuals_alone() -> None:
-    """What differs within the block and its guard moves no term, and the other way round."""
-    episode = toy.episode(samples=200, release_time=5.9)
-    loss = loss_of(episode, held_out=np.array([[2.0, 3.0]]), median_window=1)
-    off, late = toy.rollouts(episode), toy.rollouts(episode)
-    inside = (off.times > 2.1) & (off.times < 2.9)
-    pictures = (off.cloud_time > 2.1) & (off.cloud_time < 2.9)
-    off.force[0, inside, 1], off.center_line[0, pictures, :, 2] = 4, -0.01
-    late.force[0, off.times > 3.5, 1] = 4
-    late.center_line[0, off.cloud_time > 3.5, :, 2] -= 0.01
-    clean = loss.terms(toy.rollouts(episode))
-    for name in ("geom", "force", "work"):
-        assert loss.terms(off)[name][0] == pytest.approx(clean[name][0], abs=1e-3)
-        assert loss.terms(late)[name][0] > clean[name][0] + 0.1
-    residuals = loss.residuals(off)
-    force, cloud = residuals["force"], residuals["cloud"]
-    assert force["held_out"][0] == pytest.approx(4 * 0.8, rel=0.05)
-    assert cloud["held_out"][0] == pytest.approx(pictures.sum() / loss.held_frames.sum(), rel=0.01)
-    assert loss.residuals(late)["force"]["held_out"][0] < 1e-6
-    assert force["fitted"][0] < 1e-3 and cloud["fitted"][0] < 0.01
-
-
-def test_samples_and_frames_are_fitted_or_held_out_and_samples_may_be_guards() -> None:
-    loss = loss_of(toy.episode(), held_out=BLOCKS, median_window=1)
-    for time, fitted, held in (
-        (loss.time, loss.fitted_samples, loss.held_samples),
-        (toy.episode().cloud_time, loss.fitted_frames, loss.held_frames),
-    ):
-        assert not (fitted & held).any()
-        np.testing.assert_array_equal(held, (time > 0.45) & (time < 0.75))
-    guard = ~(loss.fitted_samples | loss.held_samples)
-    assert guard.any()
-    assert np.abs(np.abs(loss.time[guard] - 0.6) - 0.15).max() < 0.1
-    assert (loss.fitted_frames | loss.held_frames).all()  # clouds pass no filter
-
-
 def test_terms_of_a_rollout_hang_on_no_other_of_its_batch() -> None:
     """To the bit: batches are cut as devices and threads come."""
     rng = np.random.default_rng(3)
@@ -149,13 +95,3 @@ def test_terms_of_a_rollout_hang_on_no_other_of_its_batch() -> None:
         part.center_line, part.force = lines.center_line[first:last], lines.force[first:last]
         for name, value in loss.terms(part).items():
             np.testing.assert_array_equal(value, together[name][first:last])
-
-
-def test_without_blocks_nothing_is_held_out() -> None:
-    episode = toy.episode()
-    lines = toy.rollouts(episode, shift=(0.001, 0, -0.01), force=(0.1, 1, 0))
-    plain, none = loss_of(episode), loss_of(episode, held_out=np.zeros((0, 2)))
-    for name, value in plain.terms(lines).items():
-        np.testing.assert_array_equal(none.terms(lines)[name], value)
-    residuals = plain.residuals(lines).values()
-    assert all(np.isnan(parts["held_out"]).all() for parts in residuals)

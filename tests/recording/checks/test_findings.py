@@ -27,7 +27,6 @@ from pipeline.recording.input.clocks import ClockRate
 from pipeline.recording.tips import LensFactor
 from tests.project import with_
 from tests.recording.checks.made import abouts, with_facts, with_recording, with_results
-from tools import checks
 
 
 def test_each_check_has_a_test_of_a_recording_on_which_it_fires() -> None:
@@ -36,11 +35,6 @@ def test_each_check_has_a_test_of_a_recording_on_which_it_fires() -> None:
         for text in re.findall(r"@pytest\.mark\.fires\(([^)]*)\)", file.read_text()):
             marked |= set(ast.literal_eval(f"({text},)"))
     assert marked == {check.name for check in CHECKS}
-
-
-def test_the_page_has_the_table() -> None:
-    page = checks.PAGE.read_text(encoding="utf-8")
-    assert checks.drawn(page) == page, "run `python tools/checks.py --fix`"
 
 
 def test_names_are_of_rows(checked) -> None:

@@ -91,13 +91,6 @@ def test_a_theta_by_hand_needs_no_confidence(root, params, text_alone) -> None:
     assert "† The interval holds the draw's error alone" in text
 
 
-def test_held_out_data_have_a_table_where_params_hold_some_out(root, params, text_alone) -> None:
-    """Though nothing is known of them: the toy's replay has none."""
-    assert "held out" not in written(root, params)
-    text = written(root, with_(params, "loss.held_out", blocks=2))
-    assert "| toy | Sling2Sim2Real | 0.200 | – | – |" in text
-
-
 def test_says_of_a_policy_what_it_was_trained_on(root, params, text_alone) -> None:
     maps, samples = "reads landings off maps", "512 × 4 samples each"
     text = written(root, params)

@@ -5,13 +5,9 @@ import numpy as np
 from pipeline.report.run.landscape import Landscape
 from pipeline.report.run.replay import MethodReplay
 
-NOTHING = {kind: {"fitted": 0.2, "held_out": np.nan} for kind in ("force", "cloud")}
 
-
-def toy_replay(params, band, method, episode, theta, residuals=NOTHING) -> MethodReplay:
-    return MethodReplay(
-        force=0.9 * episode.force, distance=np.full(len(episode.clouds), 0.01), residuals=residuals
-    )
+def toy_replay(params, band, method, episode, theta) -> MethodReplay:
+    return MethodReplay(0.9 * episode.force, np.full(len(episode.clouds), 0.01))
 
 
 def toy_landscape(params, result, episode) -> Landscape:

@@ -49,7 +49,16 @@ LAUNCHES = {
         "package_si": pd.concat([launches(NEAR), launches([[0.05], [0.04], [0.06]], "measured")]),
     },
     BAND: {
-        OURS: pd.concat([mixed(), launches([[0.01, 0.03]], "measured", targets=[1.6])]),
+        OURS: pd.concat(
+            [
+                mixed(),
+                launches(
+                    [[0.01, 0.03]], "measured", targets=[1.6], predicted_y=[1.58, np.nan],
+                    predicted_failure=[None, "the simulation did not converge"],
+                    hold_force=[9.0, np.nan],
+                ),
+            ]
+        ),
         METHOD: NOTHING,
         "real2sim2real": NOTHING,
         "package_si": launches([[0.1]], "measured", targets=[2.0], target=np.nan),

@@ -43,7 +43,7 @@ def test_held_force_is_the_laws(string: ElasticString) -> None:
 def test_a_band_of_a_centimetre_pulls_as_two_straight_halves(string: ElasticString) -> None:
     """Clamps and hand bend it, and take no more than a hundredth of its length to stretch.
 
-    A solid of tetrahedra says the same, in our solver and in MuJoCo's (reports/simulator.md).
+    MuJoCo's solid of tetrahedra says the same (reports/simulator.md).
     """
     thick = replace(string, edges=120)
     y = thick.at_rest(bent_at(thick, DRAWN), 1e-5, held=True)

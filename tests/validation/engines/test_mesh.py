@@ -1,7 +1,6 @@
 """The band as other engines take it, and the comparison where there is nothing to compare with."""
 
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,8 +45,3 @@ def test_without_mujoco_the_section_says_how_to_get_it(bench, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(UserError, match="make setup"):
         checks.section(bench)
-
-
-def test_our_tetrahedra_are_compared_on_the_cpu_whatever_the_device(bench):
-    same = checks.solid(replace(bench, device="cuda:0"))
-    assert same.device == "cpu" and same.params.sling.mesh == "tetrahedra"

@@ -147,7 +147,7 @@ def compared(setting: str, ours: BandMotion, theirs: BandMotion, limits: bool) -
     force = np.linalg.norm(theirs.force - ours.force, axis=1).max()
     peak = np.linalg.norm(ours.force, axis=1).max()
     distance = np.linalg.norm(theirs.lines - ours.lines, axis=2)[:held]
-    against = "our simulator, the same tetrahedra"
+    against = "our simulator"
 
     def finding(name: str, value: float, unit: str, limit: float, note: str) -> Measure:
         return Measure(f"{name}, {setting}", against, value, unit, limit if limits else None, note)
@@ -174,7 +174,7 @@ def pulls(bench: Bench, engine: Engine) -> list[Measure]:
     Raises:
         UserError: PhysX is not installed, or there is no GPU.
     """
-    sling = checks.sling_of(checks.solid(bench))
+    sling = checks.sling_of(bench)
     sling = replace(sling, finger_opening_time=sling.steps.recoil_step)  # PhysX lets go at once
     tube = Tube.of(sling, **checks.SAME_MESH)
     episode = _marked(checks.episode_of(sling))

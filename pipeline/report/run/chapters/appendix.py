@@ -23,7 +23,6 @@ def appendix(report: Report) -> str:
     """The second page; writes differences.csv where methods are compared."""
     params, results, styles = report.params, report.results, report.styles
     predicted, derived = prediction_summary(results, styles), identified.derived(results, styles)
-    held_out = identified.held_out(report.replays, styles) if params.loss.held_out.blocks else None
     alt = "force against draw, residual force, distance of the clouds"
     return filled(
         Path(__file__).with_name("appendix.md.j2"),
@@ -39,7 +38,6 @@ def appendix(report: Report) -> str:
             if not (launches := of_kind(methods[report.main].trials, "measured")).empty
         },
         pull=report.picture("pull", alt, pull, results.episodes, report.replays, styles),
-        held_out=markdown(held_out, repeats=False),
         methods=markdown(identified.methods(results, params, styles)),
         losses=markdown(identified.losses(results, params, styles), repeats=False),
         convergence=_convergence(report),

@@ -1,4 +1,4 @@
-"""What the searches found beside the parameters: derived quantities, losses, residuals."""
+"""What the searches found beside the parameters: derived quantities, losses."""
 
 from __future__ import annotations
 
@@ -11,12 +11,10 @@ from pipeline.params.identification import LEAST_SQUARES
 from pipeline.report.drawing.names import as_code, cell
 from pipeline.report.drawing.styles import Styles
 from pipeline.report.quantities import QUANTITIES, Quantity, coordinate
-from pipeline.report.run.replay import MethodReplay
 from pipeline.report.run.results import Results
 from pipeline.report.run.tables.cells import NONE, Table, number, percent
 from pipeline.report.run.tables.parameters import exactly, printed_loss
 
-PARTS = ("fitted", "held out", "ratio")
 SEARCHES = {
     LEAST_SQUARES: "a design, then Levenberg-Marquardt",
     "de": "differential evolution",
@@ -156,17 +154,3 @@ def losses(results: Results, params: Params, styles: Styles) -> Table:
         cells += [number(total, ".4g"), number(common, ".4g"), str(spent)]
         rows.append([result.band, styles[result.method].name, *cells])
     return heads, rows
-
-
-def held_out(replays: dict[str, dict[str, MethodReplay]], styles: Styles) -> Table:
-    """Residuals of fitted and of held-out data of each band's pull, by band and method."""
-    rows = []
-    for band, of_band in replays.items():
-        for method, replay in of_band.items():
-            cells = []
-            for kind, form in (("force", ".3f"), ("cloud", ".2f")):
-                fitted, held = (replay.residuals[kind][part] for part in ("fitted", "held_out"))
-                cells += [number(fitted, form), number(held, form), number(held / fitted, ".2f")]
-            rows.append([band, styles[method].name, *cells])
-    heads = [f"{what}, {part}" for what in ("force [N]", "cloud [cm]") for part in PARTS]
-    return ["band", "method", *heads], rows

@@ -20,7 +20,7 @@ THETA = np.array([2.2e5, 0.45, 3e-3, 1.0, 1.0])
 
 @pytest.fixture(scope="module")
 def sling(bench):
-    return checks.sling_of(checks.solid(bench))
+    return checks.sling_of(bench)
 
 
 @pytest.fixture(scope="module")

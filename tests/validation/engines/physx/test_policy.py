@@ -13,7 +13,7 @@ from pipeline.params import load
 from pipeline.simulator.launch import launch
 from pipeline.simulator.parameters import THETA, Parameters
 from tests.project import DEFAULTS
-from validation.engines.physx import policy, policy_table
+from validation.engines.physx import policy
 from validation.projects import changed
 
 VALUES = (2.0e5, 0.47, 2.4e-3, 0.7, 0.6)
@@ -103,11 +103,3 @@ def test_the_rig_alone_wants_a_report(begun, tmp_path, monkeypatch) -> None:
 def test_without_a_search_in_physx_a_line_says_what_finds_theta(begun) -> None:
     with pytest.raises(UserError, match="physx.search band1 finds one"):
         policy.main()
-
-
-def test_the_page_has_what_the_reports_hold() -> None:
-    page = policy_table.PAGE.read_text(encoding="utf-8")
-    assert policy_table.drawn(page) == page
-    lost = {"errors": {"in_physx_m": {"mean_error_m": 0.01}, "in_ours_m": {"mean_error_m": 0.02}}}
-    lost["measured"] = [{"measured_m": 1.0, "in_physx_m": 1.5}]
-    assert "| 1 measured draws land 50 cm nearer than in PhysX |" in policy_table.block({"b": lost})

@@ -1,0 +1,115 @@
+"""Blocks of pages that a script writes between two marks: from the code, or from results in Git.
+
+python -m validation.pages          # exit status 1 if a page is out of date
+python -m validation.pages --fix    # write them anew
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import networkx
+
+from pipeline.base import errors
+from pipeline.base.code import CODE, ROOT, concern, imports
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_text
+from pipeline.recording.checks.table import CHECKS
+from validation.benchmarks import times
+from validation.campaigns import field, landings
+from validation.campaigns.runner import read
+from validation.reports import row
+
+CODE_BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)  # language, code
+WHOLE = "stages", "app", "sling2sim2real", "validation", "rig"  # each a box; the library is several
+LEFT_OUT = "pipeline/base", "pipeline/params"  # which all import
+DEVELOPERS = "app/developer.py"  # may import validation/
+
+
+def box(file: str) -> str:
+    """The box of a file: a top-level package, or a folder of the library."""
+    top = file.partition("/")[0]
+    if top in WHOLE:
+        return top
+    folder = concern(file)
+    return "/".join(folder.split("/")[:2]) if folder.count("/") > 1 else folder
+
+
+def arrows() -> list[tuple[str, str]]:
+    """List who imports whom, sorted: the transitive reduction of all imports."""
+    graph = networkx.DiGraph()
+    for file in sorted(file for top in CODE for file in (ROOT / top).rglob("*.py")):
+        if file == ROOT / DEVELOPERS:
+            continue
+        here = box(file.relative_to(ROOT).as_posix())
+        for other in imports(file):
+            there = box(other.relative_to(ROOT).as_posix())
+            if here != there and not there.endswith(".py") and there not in LEFT_OUT:
+                graph.add_edge(here, there)
+    graph.remove_nodes_from(LEFT_OUT)
+    return sorted(networkx.transitive_reduction(graph).edges)
+
+
+def diagram() -> list[str]:
+    """Who imports whom, as Mermaid draws it."""
+
+    def node(folder: str) -> str:
+        return f"{folder.replace('/', '_')}[{folder}]"
+
+    lines = [f"  {node(here)} --> {node(there)}" for here, there in arrows()]
+    return ["```mermaid", "flowchart TD", *lines, "```"]
+
+
+def checks() -> list[str]:
+    """All checks of a recording."""
+    heads = "check", "compares", "uncertainty", "warns", "refuses", "remedy"
+    rows = [
+        (f"`{check.name}`", *(getattr(check, head) or "–" for head in heads[1:]))
+        for check in CHECKS
+    ]
+    return [row(*cells) for cells in (heads, ("---",) * len(heads), *rows)]
+
+
+BLOCKS: dict[str, tuple[str, Callable[[], list[str]]]] = {  # by page: name of its marks, its lines
+    "README.md": ("landings", lambda: landings.sentence(read(ROOT / landings.report_of("sealed")))),
+    "docs/architecture.md": ("imports", diagram),
+    "docs/faq.md": ("checks", checks),
+    "docs/identification.md": (
+        "landings",
+        lambda: landings.table({s: read(ROOT / landings.report_of(s)) for s in landings.SETS}),
+    ),
+    "docs/recording.md": ("field", lambda: field.table(read(ROOT / field.REPORT))),
+    "docs/times.md": ("times", lambda: times.table(read(ROOT / times.REPORT))),
+}
+
+
+def drawn(page: str, root: Path = ROOT) -> str:
+    """A page's text with today's block. Raises UserError where it has not each mark once."""
+    name, lines = BLOCKS[page]
+    begin, end = f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->\n"
+    text = (root / page).read_text(encoding="utf-8")
+    if text.count(begin) != 1 or text.count(end) != 1:
+        raise UserError(f"{page}: has not one {begin.strip()} and one {end.strip()}")
+    head, rest = text.split(begin)
+    return head + begin + "\n".join(lines()) + "\n" + end + rest.split(end)[1]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--fix", action="store_true", help="write them anew")
+    fix, late = parser.parse_args().fix, 0
+    for page in BLOCKS:
+        text = drawn(page)
+        if text != (ROOT / page).read_text(encoding="utf-8"):
+            late += 1
+            print(f"{page}: {'written anew' if fix else 'out of date'}")
+            if fix:
+                write_text(ROOT / page, text)
+    return int(late > 0 and not fix)
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -43,8 +43,8 @@ def export(model: Model, to: str, out: str | Path, *, episode: Episode | None = 
 
     Args:
         model: From `identify`, or written by hand.
-        to: `mjcf` for MuJoCo; `newton` for Newton, which must be installed (extra `export`);
-            `usd` for PhysX, matched there where a GPU is at hand.
+        to: `mjcf` for MuJoCo; `newton` for Newton, which must be installed (extra `export`); `usd`
+            for PhysX, to be matched there.
         out: Folder; what an export wrote there before is replaced.
         episode: Whose pull is compared in both; None: a planned one.
 

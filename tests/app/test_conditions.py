@@ -1,4 +1,4 @@
-"""Conditions that a user meets: a project that may not be written, a full disk, a ZIP, other code."""
+"""What a user may meet: a project that cannot be written, a full disk, a ZIP, code like ours."""
 
 import os
 import subprocess

@@ -1,9 +1,20 @@
-from pathlib import Path
-
 import pytest
 
-from pipeline.export import usd
-from sling2sim2real import Band, Model, Settings, Theta, export
+from pipeline.export.mesh import Tube
+from pipeline.export.usd import EDGES, GRADING, UsdBand
+from sling2sim2real import Band, Model, Settings, Theta
+from validation.engines import checks
+
+
+@pytest.fixture(scope="session")
+def sling(bench):
+    """In place of the folder's: without air."""
+    return checks.sling_of(bench)
+
+
+@pytest.fixture(scope="session")
+def tube(sling) -> Tube:
+    return Tube.of(sling, EDGES, GRADING)
 
 
 @pytest.fixture(scope="session")
@@ -12,14 +23,7 @@ def model(delivered) -> Model:
     return Model(band, Theta(1.8e5, 0.47, 2.4e-3, 0.7, 0.6), settings=Settings.coarse())
 
 
-@pytest.fixture(scope="module")
-def without_physx():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(usd, "match_of", lambda target: None)
-        yield
-
-
-@pytest.fixture(scope="module")
-def folder(model, without_physx, tmp_path_factory) -> Path:
-    """Of an export for PhysX."""
-    return export(model, "usd", tmp_path_factory.mktemp("stage") / "usd").folder
+@pytest.fixture(scope="session")
+def band(model) -> UsdBand:
+    """Of an export, softer than what is wanted by a fifth."""
+    return UsdBand(Tube.of(model.sling, EDGES, GRADING), 1.3e5, 0.47, 0.7)

@@ -38,7 +38,3 @@ def force_on(tube, sections, nodes, young, poisson, step=None) -> np.ndarray:
     far = np.linalg.norm(away, axis=-1)
     pull = np.array([nominal(np.maximum(row, length) / length, poisson[0]) for row in far])
     return (area * young[:, None, None] * pull[..., None] * away / far[..., None]).sum(axis=1)
-
-
-def energy(tube, nodes, young, poisson) -> np.ndarray:
-    return np.ones(len(nodes))

@@ -9,25 +9,16 @@ from pipeline.base.errors import UserError
 from pipeline.export import usd
 from pipeline.export.match import compared, proof_draws
 from pipeline.export.mesh import Tube
-from pipeline.export.usd import UsdBand, near_draws
+from pipeline.export.usd import near_draws
 from sling2sim2real import export
 from tests.validation.engines.physx import strings
 from tests.validation.engines.physx.strings import StringEngine
-from validation.engines.physx import flight, match
-
-POISSON = 0.47
-
-
-@pytest.fixture(scope="module")
-def band(model) -> UsdBand:
-    """Softer than what is wanted by a fifth."""
-    return UsdBand(Tube.of(model.sling, usd.EDGES, usd.GRADING), 1.3e5, POISSON, 0.7)
+from validation.engines.physx import launches, match
 
 
 @pytest.fixture(autouse=True)
 def of_strings(monkeypatch) -> None:
-    monkeypatch.setattr(flight, "force_on", strings.force_on)
-    monkeypatch.setattr(flight, "energy", strings.energy)
+    monkeypatch.setattr(launches, "force_on", strings.force_on)
 
 
 def held(model, band) -> np.ndarray:
@@ -56,7 +47,7 @@ def test_what_a_stage_alone_does_otherwise_is_corrected(model, band, monkeypatch
             tube, sections, nodes, *rest, **more
         )
 
-    monkeypatch.setattr(flight, "force_on", force_on)
+    monkeypatch.setattr(launches, "force_on", force_on)
     rough, corrected = (
         held(model, match.fitted(StringEngine(band.tube), model, band, corrections=count)[0])
         for count in (0, match.CORRECTIONS)
@@ -90,6 +81,14 @@ def test_what_no_error_tells_stays_where_it_was() -> None:
     slopes = np.array([[50.0, 0.0, 0.0, 0.0]])
     assert match._least(np.array([1.0]), slopes) == pytest.approx([-0.02, 0, 0, 0], rel=1e-2)
     assert match._least(np.array([1e3]), slopes)[0] == pytest.approx(-match.FARTHEST[0])
+
+
+def test_an_arm_gives_way_towards_the_fork() -> None:
+    draws, force = np.array([[-0.4, 0.0], [-0.3, -0.4]]), np.array([12.0, 24.0])
+    assert match.yielded(draws, force, 12_000.0) == pytest.approx(
+        np.array([[-0.399, 0.0], [-0.2988, -0.3984]])
+    )
+    assert match.yielded(draws, force, None) == pytest.approx(draws)
 
 
 def test_without_physx_or_a_gpu_there_is_no_match(model, band, monkeypatch) -> None:

@@ -162,7 +162,8 @@ def no_simulation(monkeypatch) -> None:
 @pytest.fixture
 def text_alone(monkeypatch) -> None:
     """Pictures and the page take seconds, and tell a test of the text nothing."""
-    monkeypatch.setattr(reporting.Report, "picture", lambda _, name, *__: f"{name}.png")
+    shown = lambda _, name, alt, *__: f"![{alt}](figures/{name}.png)\n"  # noqa: E731
+    monkeypatch.setattr(reporting.Report, "picture", shown)
     monkeypatch.setattr(writing, "write_page", lambda *_: None)
 
 

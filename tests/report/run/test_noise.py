@@ -5,13 +5,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
 from pipeline.report.run import noise
 from pipeline.report.run.noise import difference
-from tests.report.run.tables.toy_results import launches
+from tests.report.run.toy_launches import launches
 
 ONE = [1.925]
 
@@ -98,7 +98,6 @@ def test_measured_launches_are_compared_where_both_aimed() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-0.05, 0.05))
-@settings(max_examples=20, deadline=None)
 def test_to_and_fro_are_opposite_and_seeded(seed: int, shift: float) -> None:
     errors = np.random.default_rng(seed).normal(0, 0.02, (3, 5))
     first, second = launches(0.1 + errors), launches(0.1 + shift + errors[::-1])

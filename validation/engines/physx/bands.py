@@ -14,7 +14,6 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.export.mesh import Tube
-from pipeline.export.usd import RATE
 from validation.engines.physx import scene, worker
 from validation.engines.physx.scene import Drive
 
@@ -61,7 +60,7 @@ class Engine:
             Of each phase the nodes' places after the steps kept [m], (K, N, sections, V, 3).
         """
         start = np.tile(tube.hanging.reshape(-1, 3), (len(thetas), 1, 1))
-        done = self.run(scene.text(tube, thetas, RATE), scene.job(tube, start, phases, RATE))
+        done = self.run(scene.text(tube, thetas), scene.job(tube, start, phases))
         shape = (-1, len(thetas), *tube.rest.shape)
         return [done[f"positions_{i}"].reshape(shape).astype(float) for i in range(len(phases))]
 

@@ -1,7 +1,5 @@
 """Launches in PhysX: the band pushes a projectile that is simulated beside it.
 
-    python -m validation.engines.physx.launches band1 --theta 2.2e5,0.45,3e-3,1,1 [--rate 200]
-
 PhysX cannot free what it leads, so the pouch stays led: where a projectile would go that feels the
 band's force by PhysX's law (law.py) and gravity, with the mass of the held section. A step of the
 projectile follows each step of PhysX (leapfrog), until the band no longer pushes along the launch;
@@ -10,20 +8,14 @@ the projectile then flies as ours does. The arm does not give way, and PhysX's b
 
 from __future__ import annotations
 
-import argparse
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
-from pipeline.base import errors
-from pipeline.base.errors import UserError
 from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.export.mesh import Tube
-from pipeline.export.usd import EDGES, GRADING, RATE
-from pipeline.identify.results.mounting import load_sling
-from pipeline.params import load
-from pipeline.simulator.launch import Launches, launch, outcomes
+from pipeline.export.usd import RATE
+from pipeline.simulator.launch import Launches, outcomes
 from pipeline.simulator.model import GRAVITY, ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import LANE, Outcome
@@ -34,7 +26,6 @@ from validation.engines.physx.law import force_on
 from validation.engines.physx.scene import Drive
 
 HANG, PULL, HOLD = 1.0, 2.0, 1.0  # s
-COLUMNS = "draw_y_m", "draw_z_m", "ours_m", "physx_m", "ours_N", "physx_N"
 
 
 class Flight:
@@ -46,7 +37,6 @@ class Flight:
     Args:
         thetas: The five parameters of each band, shape (N, 5).
         places: Where the pouches rest (y, z) [m], shape (N, 2).
-        rate: Steps a second.
     """
 
     def __init__(
@@ -56,13 +46,12 @@ class Flight:
         tube: Tube,
         thetas: np.ndarray,
         places: np.ndarray,
-        rate: int,
     ) -> None:
         self.sling, self.setup, self.tube = sling, setup, tube
-        self.start, self.step = np.asarray(places), 1 / rate
+        self.start, self.step = np.asarray(places), 1 / RATE
         self.parameters = Parameters.of(NEO_HOOKEAN, thetas)
         self.young, self.poisson, damping = np.asarray(thetas, float).T[:3]
-        self.delay, size = damping * rate, len(places)
+        self.delay, size = damping * RATE, len(places)
         self.mass = setup.projectile_mass + tube.mass[tube.hand].sum()
         self.place = np.column_stack([np.zeros(size), self.start])
         self.direction = -self.place / np.linalg.norm(self.place, axis=1, keepdims=True)
@@ -129,36 +118,33 @@ def launched(
     sling: ClampedBand,
     setup: LaunchSetup,
     places: np.ndarray,
-    *,
-    rate: int = RATE,
 ) -> Launches:
     """Launches from where the hand rests, `places` (N, 2) [m], by a stage of N bands.
 
     Args:
         text: The stage: `scene.text`, or of one band an exported stage.
         thetas: Of its bands, shape (N, 5).
-        rate: Steps a second, as the stage says.
 
     Raises:
         UserError: As `Engine.run`.
     """
     rigid = replace(setup, arm_stiffness=None, history=None)
-    flight = Flight(sling, rigid, tube, thetas, places, rate)
+    flight = Flight(sling, rigid, tube, thetas, places)
     flat = tube.clamped.reshape(-1, 3)
-    start, phases = np.tile(flat, (len(places), 1, 1)), drives(tube, places, rate)
+    start, phases = np.tile(flat, (len(places), 1, 1)), drives(tube, places)
     shape = (len(places), *tube.rest.shape)
 
     def steer(nodes: np.ndarray) -> np.ndarray | None:
         return flight(nodes.reshape(shape).astype(float))
 
-    engine.run(text, scene.job(tube, start, phases, rate), steer)
+    engine.run(text, scene.job(tube, start, phases), steer)
     return flight.outcome()
 
 
-def drives(tube: Tube, places: np.ndarray, rate: int) -> list[Drive]:
+def drives(tube: Tube, places: np.ndarray) -> list[Drive]:
     """Hang in the clamps; then the middles are led to `places` (N, 2) and held there."""
     flat = tube.clamped.reshape(-1, 3)
-    hang, pull, hold = (round(time * rate) for time in (HANG, PULL, HOLD))
+    hang, pull, hold = (round(time * RATE) for time in (HANG, PULL, HOLD))
     part = minimum_jerk(np.arange(1, pull + hold + 1) / pull)
     begin = flat[tube.hand].mean(axis=0)
     goals = np.column_stack([np.zeros(len(places)), places])
@@ -179,49 +165,3 @@ def led_to(tube: Tube, places: np.ndarray) -> np.ndarray:
     ends = np.tile(tube.clamped.reshape(-1, 3)[tube.ends], (len(places), 1, 1))
     pouch = places[:, None] + tube.rest[tube.middle] * [0.0, 1.0, 1.0]
     return np.concatenate([ends, pouch], axis=1)
-
-
-def draws_of(setup) -> np.ndarray:
-    """Three draws on the diagonal of the box, shape (3, 2)."""
-    low, high = np.array([setup.draw_y, setup.draw_z]).T
-    return low + np.array([[0.25], [0.5], [0.75]]) * (high - low)
-
-
-def theta_of(text: str) -> np.ndarray:
-    """The five parameters, shape (5,). Raises UserError."""
-    with suppress(ValueError):
-        theta = np.array(text.split(","), float)
-        if theta.shape == (5,) and theta[0] > 0 and 0 < theta[1] < 0.5 and (theta >= 0).all():
-            return theta
-    raise UserError(f"--theta {text}: needs E,nu,d,mu,s, five numbers, nu between 0 and 0.5")
-
-
-def main() -> None:
-    """Print where PhysX and ours land. Raises UserError."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("band")
-    parser.add_argument("--theta", required=True, help="E,nu,d,mu,s")
-    parser.add_argument("--rate", type=int, default=RATE, help="PhysX's steps a second")
-    parser.add_argument("--params", default="params.yaml")
-    requested = parser.parse_args()
-    if requested.rate < 1:
-        raise UserError(f"--rate {requested.rate}: must be a whole number above 0")
-    params = load(requested.params)
-    if requested.band not in params.bands:
-        raise UserError(f"no band {requested.band} in {requested.params}")
-    sling = replace(load_sling(params, requested.band), law=NEO_HOOKEAN)
-    setup = replace(LaunchSetup.of(params.setup, params.sling), arm_stiffness=None)
-    draws, tube = draws_of(params.setup), Tube.of(sling, EDGES, GRADING)
-    thetas = np.tile(theta_of(requested.theta), (len(draws), 1))
-    ours = launch(sling, setup, Parameters.of(sling.law, thetas), draws)
-    text = scene.text(tube, thetas, requested.rate)
-    with Engine() as engine:
-        theirs = launched(engine, text, tube, thetas, sling, setup, draws, rate=requested.rate)
-    print(*(f"{name:>9}" for name in COLUMNS), " PhysX: why not")
-    columns = ours.landing_y, theirs.landing_y, ours.hold_force, theirs.hold_force
-    for *row, why in zip(*draws.T, *columns, theirs.failure, strict=True):
-        print(*(f"{number:9.3f}" for number in row), f" {why or ''}")
-
-
-if __name__ == "__main__":
-    errors.run(main)

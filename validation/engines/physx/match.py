@@ -33,7 +33,7 @@ from pipeline.export.band import CalibratedBand
 from pipeline.export.match import HOLD, LANDING, LOST, compared, proof_draws
 from pipeline.export.mesh import Tube
 from pipeline.export.replay import Shot
-from pipeline.export.usd import EDGES, GRADING, RATE, UsdBand, UsdMatch, near_draws
+from pipeline.export.usd import EDGES, GRADING, UsdBand, UsdMatch, near_draws
 from pipeline.simulator.launch import Launches
 from validation.engines.physx import scene
 from validation.engines.physx.bands import INTERPRETER, Engine, release
@@ -150,7 +150,7 @@ def _errors(
     count, same = len(draws), changed(model, band, grid[0])
     places = np.tile(_places(model, draws, ours), (len(grid), 1))
     thetas = _thetas(same, np.repeat(band.young * np.exp(grid[:, 0]), count))
-    stage = scene.text(same.tube, thetas, RATE)
+    stage = scene.text(same.tube, thetas)
     shots = _shots(engine, stage, model, same.tube, thetas, places)
     starts = range(0, len(shots), count)
     return np.array([_relative(shots[start : start + count], ours) for start in starts])

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.export.mesh import Tube
-from pipeline.export.usd import ITERATIONS, surface
+from pipeline.export.usd import ITERATIONS, RATE, surface
 from pipeline.simulator.model import GRAVITY
 
 SPACING = np.array([1.0, 2.5])  # m along x and y from band to band: none reaches the next
@@ -87,10 +87,10 @@ class Drive:
     keep: bool = False
 
 
-def job(tube: Tube, start: np.ndarray, phases: list[Drive], rate: int) -> dict:
+def job(tube: Tube, start: np.ndarray, phases: list[Drive]) -> dict:
     """What is done with the N bands of a stage, whose nodes begin at `start` (N, nodes, 3) [m]."""
     content = {
-        "step": 1 / rate,
+        "step": 1 / RATE,
         "phases": len(phases),
         "offsets": offsets(len(start)),
         "rest": tube.rest.reshape(-1, 3),
@@ -107,12 +107,11 @@ def offsets(count: int) -> np.ndarray:
     return np.stack([column * SPACING[0], row * SPACING[1], 0.0 * row], axis=1)
 
 
-def text(tube: Tube, thetas: np.ndarray, rate: int) -> str:
+def text(tube: Tube, thetas: np.ndarray) -> str:
     """The scene.
 
     Args:
         thetas: The five parameters of each band, shape (N, 5); the damping scale has no slot.
-        rate: Steps a second.
     """
     mesh = {
         "points": _tuples(tube.rest.reshape(-1, 3), ".9g"),
@@ -121,7 +120,7 @@ def text(tube: Tube, thetas: np.ndarray, rate: int) -> str:
         "mass": tube.mass.sum(),
         "iterations": ITERATIONS,
     }
-    parts = [HEADER % {"gravity": GRAVITY, "rate": rate}]
+    parts = [HEADER % {"gravity": GRAVITY, "rate": RATE}]
     for i, ((young, poisson, damping, friction, _), (x, y, _)) in enumerate(
         zip(thetas, offsets(len(thetas)), strict=True)
     ):

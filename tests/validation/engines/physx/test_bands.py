@@ -62,15 +62,12 @@ def test_a_law_that_physx_lacks_is_refused(sling):
         rollouts.simulate(replace(sling, law="rubber"), episode=None, parameters=None, device="cpu")
 
 
-def test_without_physx_one_line_says_how_to_get_it(monkeypatch):
+def test_without_physx_or_its_python_one_line_says_so(monkeypatch):
     monkeypatch.setenv(bands.INTERPRETER, "")  # this Python
     monkeypatch.setattr(bands, "ASK", bands.ASK.replace("ovstage", "no-such-engine"))
     with pytest.raises(UserError, match="no-such-engine.*pip install") as message:
         bands.release()
     assert "\n" not in str(message.value)
-
-
-def test_a_python_that_is_not_there_is_named(monkeypatch):
     monkeypatch.setenv(bands.INTERPRETER, "/not/there")
     with pytest.raises(UserError, match="SLING_PHYSX=/not/there: No such file"):
         bands.release()

@@ -2,7 +2,7 @@
 
 import sys
 from dataclasses import replace
-from types import SimpleNamespace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -49,12 +49,10 @@ def launch_setup(bench):
 @pytest.fixture
 def engine(tmp_path, monkeypatch):
     """bands.Engine with a process in which nothing but the led nodes moves."""
-    folder = str(worker.__file__).rpartition("/")[0]
-    (tmp_path / "fake.py").write_text(PROCESS.format(folder=folder))
+    (tmp_path / "fake.py").write_text(PROCESS.format(folder=str(Path(worker.__file__).parent)))
     monkeypatch.setenv(bands.INTERPRETER, sys.executable)
     monkeypatch.setattr(bands, "release", lambda: "0")
-    fake = {**vars(worker), "__file__": str(tmp_path / "fake.py")}
-    monkeypatch.setattr(bands, "worker", SimpleNamespace(**fake))
+    monkeypatch.setattr(worker, "__file__", str(tmp_path / "fake.py"))
     with bands.Engine() as engine:
         yield engine
 

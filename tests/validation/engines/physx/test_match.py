@@ -60,11 +60,6 @@ def force_on(tube, sections, nodes, young, poisson, step=None) -> np.ndarray:
     return (area * young[:, None, None] * pull[..., None] * away / far[..., None]).sum(axis=1)
 
 
-@pytest.fixture(autouse=True)
-def of_strings(monkeypatch) -> None:
-    monkeypatch.setattr(launches, "force_on", force_on)
-
-
 def held(model, shots) -> np.ndarray:
     """Errors of the force at the draws of the match."""
     draws, _ = near_draws(model)
@@ -100,6 +95,7 @@ def test_each_value_changes_by_its_own(model, band) -> None:
 
 
 def test_the_least_of_a_linear_model_is_found_and_lost_draws_do_not_count() -> None:
+    """And what no error tells stays where it was."""
     grid = np.concatenate([side * np.eye(4) for side in (-0.02, 0.0, 0.02)])
     best = np.array([0.07, -0.12, 0.03, 0.01])
     slopes = 1e4 * (np.eye(6, 4) + 0.1)
@@ -109,9 +105,6 @@ def test_the_least_of_a_linear_model_is_found_and_lost_draws_do_not_count() -> N
     assert match._least(*match._linear(grid, lost)) == pytest.approx(best, abs=1e-6)
     with pytest.raises(UserError, match="no draw of the match lands"):
         match._linear(grid, np.full((12, 2), np.nan))
-
-
-def test_what_no_error_tells_stays_where_it_was() -> None:
     slopes = np.array([[50.0, 0.0, 0.0, 0.0]])
     assert match._least(np.array([1.0]), slopes) == pytest.approx([-0.02, 0, 0, 0], rel=1e-2)
     assert match._least(np.array([1e3]), slopes)[0] == pytest.approx(-match.FARTHEST[0])
@@ -139,20 +132,16 @@ def test_without_physx_or_a_gpu_there_is_no_match(model, band, monkeypatch) -> N
 
 def test_an_export_is_matched_where_it_can_be(model, monkeypatch, tmp_path) -> None:
     """Stage and card have what the match came to; the proof's draws took no part in it."""
-    engines = []
-
-    def begun() -> nullcontext:
-        engines.append(StringEngine(Tube.of(model.sling, usd.EDGES, usd.GRADING)))
-        return nullcontext(engines[-1])
-
-    monkeypatch.setattr(match, "Engine", begun)
+    engine = StringEngine(Tube.of(model.sling, usd.EDGES, usd.GRADING))
+    monkeypatch.setattr(launches, "force_on", force_on)
+    monkeypatch.setattr(match, "Engine", lambda: nullcontext(engine))
     monkeypatch.setattr(match, "release", lambda: "0.7")
     monkeypatch.setattr(match.wp, "is_cuda_available", lambda: True)
     monkeypatch.setattr(usd, "match_of", lambda target: match.matched)
     done = export(model, "usd", tmp_path / "usd")
     card, text = done.card, (done.folder / "toy.usda").read_text()
     assert card["replayed"] and done.met is card["met"] and "0.7" in card["engine"]
-    assert text in engines[0].texts  # the very stage was launched
+    assert text in engine.texts  # the very stage was launched
     young = float(text.split("youngsModulus = ")[1].split()[0])
     assert card["matched"][0]["value"] == pytest.approx(young, rel=1e-5)
     proven = {(row["draw_y_m"], row["draw_z_m"]) for row in card["proof"]}

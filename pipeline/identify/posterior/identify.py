@@ -106,7 +106,7 @@ def fit_posterior(
     launches = None
     if evidence and evidence.launches:
         setup = replace(evidence.setup, history=recorded_history(sling, episodes))
-        launches = LaunchLikelihood(evidence.launches, sling, setup)
+        launches = LaunchLikelihood(evidence.launches, sling, setup, workers or cores())
     options = {"launches": launches, "workers": workers, "progress": progress}
     begin = coordinates.of(start)
     nearest = coordinates.parameters(begin[None])
@@ -308,13 +308,13 @@ def leave_one_out(identified: Identified, number: int) -> dict:
 
 
 def _launched(identified: Identified) -> list[dict]:
-    launches = identified.launches
-    if launches is None:
+    launches, expansion = identified.launches, identified.fit.launches
+    if launches is None or expansion is None:
         return []
     unlikely = without_each(
-        launches, identified.fit.hessian, identified.fit.gradient, identified.birge
+        expansion, identified.fit.hessian, identified.fit.gradient, identified.birge
     )
-    parts = launches.draws, launches.landings, launches.left, unlikely
+    parts = launches.draws, launches.landings, expansion.left, unlikely
     return [
         {
             "draw": draw.tolist(),

@@ -204,12 +204,14 @@ def confidence(identified: Identified) -> dict:
         for name in (*EXTRA, product)
     }
     derived |= _clocks(identified)
-    matrix = np.corrcoef(identified.samples.T + 1e-12 * np.arange(SAMPLES))
     return {
         "level": LEVEL,
         "parameters": parameters,
         "derived": derived,
-        "correlation": {"names": list(identified.coordinates.names), "matrix": matrix.tolist()},
+        "correlation": {
+            "names": list(identified.coordinates.names),
+            "matrix": correlation(identified.samples).tolist(),
+        },
         "recordings": [_left(identified, number) for number in range(len(identified.recordings))],
         "disagreement": identified.birge,
         "launches": _launched(identified),
@@ -240,6 +242,14 @@ def _priors(identified: Identified) -> dict[str, dict]:
         summary = bool(widths[axis] < FILLS * np.ptp(ends[:, axis]))
         result[name] = {"prior": values.tolist(), "identifiable": summary}
     return result
+
+
+def correlation(samples: np.ndarray) -> np.ndarray:
+    """Correlations of D columns of samples (M, D), shape (D, D); one that is constant has none."""
+    varies = np.ptp(samples, axis=0) > 0
+    matrix = np.eye(len(varies))
+    matrix[np.ix_(varies, varies)] = np.corrcoef(samples[:, varies].T)
+    return matrix
 
 
 def interval(samples: np.ndarray, mode: float) -> tuple[float, float]:

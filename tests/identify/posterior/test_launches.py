@@ -130,6 +130,19 @@ def test_each_launch_is_of_the_band_that_the_launches_before_it_left(monkeypatch
     assert np.ptp(told.left) > 0.1
 
 
+def test_launches_run_on_as_many_threads_as_the_fit_has(monkeypatch) -> None:
+    threads = set()
+
+    def counted(sling, setup, theta, draws, workers) -> SimpleNamespace:
+        threads.add(workers)
+        return toy(sling, setup, theta, draws, workers)
+
+    monkeypatch.setattr(launches, "launch", counted)
+    likelihood = LaunchLikelihood([Observed((-0.5, -0.2), 0.001, 0.3)], None, FORGETFUL, workers=5)
+    likelihood.expand(lambda phi: phi, np.zeros(2), STEPS)
+    assert threads == {5}
+
+
 def test_at_the_truth_nothing_pulls() -> None:
     phi = (0.2, -0.1)
     landing = float(toy(None, None, np.array([phi]), np.array([[-0.5, -0.2]]), 1).landing_y[0])

@@ -37,9 +37,9 @@ def write(params: Params, band: str, method: str, root: str | Path = ".") -> dic
     verdict, against = judge(card_findings)
     reasons, shown = reasons_of(card_findings, against), values(inputs.theta, method_params.fixed)
     aims = inputs.aims
-    model, samples = None, inputs.samples
-    if samples is not None:
-        landings = aims.samples, aims.slope, aims.half_width
+    model, samples, spread = None, inputs.samples, aims.spread
+    if samples is not None and spread.chosen is not None:
+        landings = spread.chosen, spread.centres, spread.slope, aims.half_width
         model = LandingModel.of(samples.names, samples.values, *landings)
     launches = len(inputs.confidence.get("launches", []))
     evidence = inputs.episodes, launches, question(card_findings)

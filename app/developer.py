@@ -18,12 +18,9 @@ LAWS = NEO_HOOKEAN, RUBBER
 )
 def verify(arguments: argparse.Namespace) -> Done:
     from pipeline.params import load
-    from validation.engines import checks as peers
     from validation.simulator.verification import summary, verify
 
-    text, missed = summary(
-        verify(load(), arguments.device, extra={"against MuJoCo": peers.section})
-    )
+    text, missed = summary(verify(load(), arguments.device))
     return text, int(missed > 0)
 
 

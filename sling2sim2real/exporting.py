@@ -39,12 +39,12 @@ def export(model: Model, to: str, out: str | Path, *, episode: Episode | None = 
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     done = export(model, "usd", folder)
     ...     sorted(file.name for file in done.folder.iterdir())
-    ['README.md', 'band.yaml', 'card.json']
+    ['README.md', 'band.usda', 'card.json', 'nodes.json']
 
     Args:
         model: From `identify`, or written by hand.
-        to: `mjcf` for MuJoCo, which must be installed (extra `validation`); `yaml` for plain
-            numbers; `usd` for PhysX, to be matched there.
+        to: `mjcf` for MuJoCo; `newton` for Newton, which must be installed (extra `export`); `usd`
+            for PhysX, to be matched there.
         out: Folder; what an export wrote there before is replaced.
         episode: Whose pull is compared in both; None: a planned one.
 

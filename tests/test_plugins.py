@@ -24,7 +24,8 @@ def foreign(tmp_path: Path) -> str:
 def test_a_foreign_plugin_is_left_alone(foreign: str, tmp_path: Path) -> None:
     """In workers too; our own do load. Without our options it would end the run."""
     (tmp_path / "test_it.py").write_text(PASSES)
-    ours = "-m", "pytest", "-c", "pyproject.toml", "-n", "1", tmp_path / "test_it.py"
+    ours = "-m", "pytest", "-c", "pyproject.toml", "-p", "tests.conftest", "-n", "1"
+    ours = (*ours, tmp_path / "test_it.py")
     done = python(*ours, PYTHONPATH=foreign)
     assert done.returncode == 0, done.stderr
     assert "1 worker [1 item]" in done.stdout and "1 passed" in done.stdout

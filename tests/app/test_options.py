@@ -190,9 +190,7 @@ def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
     patch.setattr("app.reset._committed", lambda path: DEFAULTS.read_text("utf-8"))
     patch.setattr("app.flow.run.run", summary)
     patch.setattr("app.flow.server.serve", summary)
-    patch.setattr(
-        "validation.simulator.verification.verify", lambda _, device, extra: summary(device)
-    )
+    patch.setattr("validation.simulator.verification.verify", lambda _, device: summary(device))
     patch.setattr("validation.simulator.verification.summary", lambda done: (done, 0))
     patch.setattr("pipeline.base.environment.environment", lambda *given: {"given": given})
     patch.setattr(

@@ -15,7 +15,6 @@ from resource import RUSAGE_CHILDREN, getrusage
 import numpy as np
 import psutil
 
-from pipeline.base.machine import gpus
 from pipeline.simulator.parameters import Parameters
 
 EVERY = 1.0  # s between two looks at the memory
@@ -61,10 +60,6 @@ def shared(devices: Sequence[str], simulate: Callable, parameters: Parameters, *
                 shares,
             )
         )
-
-
-def available(device: str) -> bool:
-    return device in {"cpu", *gpus()}
 
 
 def measured(

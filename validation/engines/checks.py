@@ -20,11 +20,7 @@ from validation.synthetic import ease, unseen
 THETA = np.array([2.2e5, 0.30, 3e-3, 1.0, 1.0])
 GRASP, LIFTED, DRAWN, RELEASE = 0.1, 0.7, 1.8, 2.0  # s
 DRAW, DROP = 0.38, 0.15  # m
-PULLS = (  # Poisson's ratio, rings of the section, whether the mesh is fine enough
-    (0.30, 1, True),
-    (0.45, 2, True),
-    (0.45, 1, False),
-)
+PULLS = (0.30, 1), (0.45, 2)  # Poisson's ratio, and rings of the section that are enough for it
 LAUNCHES = (  # Young's modulus, Poisson's ratio, damping, draw
     (2.2e5, 0.30, 2e-3, (-0.32, -0.12)),
     (2.2e5, 0.45, 5e-3, (-0.36, -0.15)),
@@ -44,7 +40,6 @@ rest, let go at once and gone at the first pull; there is no air. What is left o
 the band is slack, and where it becomes taut, is mostly the bending of coarse tetrahedra: it is
 several times too stiff, the more so the closer Poisson's ratio is to 0.5, and finer sections come
 closer to our figures."""
-SAME_MESH = {"edges": 52, "grading": 1.0}  # of PhysX's bands, evenly spaced
 
 
 @dataclass(frozen=True)
@@ -119,8 +114,8 @@ def pull(bench: Bench, theta, step: float = 5e-4, **mesh) -> EnginePull:
     )
 
 
-def pull_checks(result: EnginePull, title: str, fine: bool) -> list[Measure]:
-    """Force and centre line; without limits where the mesh is known to be too coarse."""
+def pull_checks(result: EnginePull, title: str) -> list[Measure]:
+    """Force and centre line."""
     worst = result.line_errors
     frame = int(worst.argmax())
     return [
@@ -129,16 +124,15 @@ def pull_checks(result: EnginePull, title: str, fine: bool) -> list[Measure]:
             "MuJoCo 3D flex",
             result.force_error,
             "%",
-            2.0 if fine else None,
-            f"{result.held_error:+.2f} % at the end of the hold"
-            + ("" if fine else "; its section is too coarse to bend freely"),
+            2.0,
+            f"{result.held_error:+.2f} % at the end of the hold",
         ),
         Measure(
             f"centre line while held, rms, {title}",
             "MuJoCo 3D flex",
             float(np.sqrt((worst**2).mean())),
             "mm",
-            5.0 if fine else None,
+            5.0,
             f"at most {worst[frame]:.1f} mm in a frame, at {result.frames[frame]:.2f} s",
         ),
     ]
@@ -174,51 +168,13 @@ def section(bench: Bench) -> Theme:
     Raises:
         UserError: MuJoCo is not installed.
     """
-    checks, results = [], []
-    for poisson, rings, fine in PULLS:
+    checks = []
+    for poisson, rings in PULLS:
         theta = THETA.copy()
         theta[1] = poisson
-        results.append(pull(bench, theta, rings=rings))
         title = f"Poisson's ratio {poisson:.2f}, {900 * rings**2} tetrahedra"
-        checks += pull_checks(results[-1], title, fine)
-    checks.append(launch_check(bench))
-    pictures = {}
-    if bench.figures:
-        draw(results[1], bench.figures / "mujoco.png")
-        pictures["mujoco.png"] = (
-            "The hand's force and the band seen from the side and from the front: ours (lines) and"
-            " MuJoCo's (dashes)."
-        )
-    return Theme("Against MuJoCo", checks, TEXT, pictures)
-
-
-def draw(result: EnginePull, path) -> None:
-    """Force over time, and centre lines at five moments from the side and from the front."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, (left, side, front) = plt.subplots(
-        1, 3, figsize=(12, 3.8), width_ratios=[1.1, 1.4, 1], layout="constrained"
-    )
-    ours, theirs = result.force
-    for axis, name in enumerate("xyz"):
-        left.plot(result.times, ours[:, axis], label=f"{name}, ours")
-        left.plot(result.times, theirs[:, axis], "k--", label="MuJoCo" if name == "z" else None)
-    left.set(xlabel="time [s]", ylabel="force on the hand [N]")
-    left.legend()
-    for k in np.linspace(0, len(result.frames) - 1, 5).astype(int):
-        ours, theirs = result.lines[:, k].transpose(0, 2, 1)
-        side.plot(*ours[1:], label=f"{result.frames[k]:.2f} s")
-        side.plot(*theirs[1:], "k--")
-        front.plot(*ours[::2])
-        front.plot(*theirs[::2], "k--")
-    side.set(xlabel="y [m]", ylabel="z [m]", aspect="equal")
-    front.set(xlabel="x [m]", ylabel="z [m]", aspect="equal")
-    side.legend(ncols=2, loc="upper left")
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+        checks += pull_checks(pull(bench, theta, rings=rings), title)
+    return Theme("Against MuJoCo", [*checks, launch_check(bench)], TEXT)
 
 
 def sling_of(bench: Bench) -> ClampedBand:
@@ -229,7 +185,7 @@ def sling_of(bench: Bench) -> ClampedBand:
 
 
 def damped(thetas: np.ndarray) -> Parameters:
-    """Parameters of thetas (N, 5): MuJoCo and PhysX damp the rate of the nominal stress."""
+    """Parameters of thetas (N, 5): MuJoCo damps the rate of the nominal stress."""
     return Parameters.of(NEO_HOOKEAN, thetas, turn_damping=1.0)
 
 

@@ -117,11 +117,6 @@ def stress(stretch, shape: tuple[float, float]):
     return 2 * (stretch - stretch**-2) * (c10 + 2 * c20 * first + c01 / stretch)
 
 
-def slope(stretch: float, shape: tuple[float, float]) -> float:
-    step = 1e-5
-    return float(stress(stretch + step, shape) - stress(stretch - step, shape)) / (2 * step)
-
-
 def left_of(stretch: float, most: float, shape: tuple[float, float], softening: float) -> float:
     """Share of `stress` that is left after a stretch of `most`, by works that are integrated."""
     done, worst = (quad(stress, 1, end, args=(shape,))[0] for end in (stretch, most))

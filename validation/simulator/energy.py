@@ -12,7 +12,6 @@ from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip, Mode
 from pipeline.simulator.schedule import RELAX_STEPS
-from validation.simulator import figures
 from validation.simulator.experiment import band_of, move
 from validation.simulator.finding import Bench, Measure, Theme
 from validation.simulator.reference import ReferenceRod
@@ -50,7 +49,6 @@ class Balance:
     softened: np.ndarray
     pads: np.ndarray
     integrator: np.ndarray
-    release: float
 
     @property
     def remainder(self) -> np.ndarray:
@@ -182,14 +180,10 @@ def balance(
         softened=np.cumsum(softened),
         pads=-np.cumsum(np.where(rows["grip"] == Grip.OPENING, hand, 0.0)),
         integrator=np.cumsum(integrator),
-        release=episode.release_time,
     )
 
 
 def checks(done: Balance) -> list[Measure]:
-    held = done.time <= done.release + 1e-9
-    total = np.abs(done.hand).max()
-    taut = (done.time > done.release) & (done.time < done.release + 0.1)
     parts = {
         name: getattr(done, name)[-1]
         for name in (
@@ -209,25 +203,8 @@ def checks(done: Balance) -> list[Measure]:
             done.share(done.miss),
             "%",
             LIMIT,
-            "of the hand's work; the steps' own loss is the miss",
-        ),
-        Measure(
-            "balance of energy, miss at the end",
-            against,
-            float(100 * np.abs(done.miss[-1]) / total),
-            "%",
-            LIMIT,
-            f"hand {done.hand[-1]:.4f} J and turning {done.turning[-1]:.4f} J = {note} J",
-        ),
-        Measure(
-            "work of the fingers' turning, largest at any time",
-            "—",
-            done.share(done.turning),
-            "%",
-            None,
-            "of the hand's work: what taking and leaving the direction of the middle does to the"
-            f" elastic energy; the balance misses {done.share(done.miss - done.turning):.2f} %"
-            " without it",
+            f"of the hand's work; the steps' own loss is the miss. At the end: hand"
+            f" {done.hand[-1]:.4f} J and turning {done.turning[-1]:.4f} J = {note} J",
         ),
         Measure(
             "residual of the kernel's steps by the reference's forces",
@@ -237,42 +214,11 @@ def checks(done: Balance) -> list[Measure]:
             LIMIT,
             "of the hand's work, largest at any time: every step is solved, no force is missing",
         ),
-        Measure(
-            "lost to the steps while held",
-            "0 for infinitely short steps",
-            done.share(done.integrator[held]),
-            "%",
-            LIMIT,
-            "second order, of the hand's work",
-        ),
-        Measure(
-            "lost to the steps in the first 0.1 s after the release",
-            "0 for infinitely short steps",
-            float(100 * np.abs(done.integrator[taut] - done.integrator[held][-1]).max() / total),
-            "%",
-            LIMIT,
-            "second order, of the hand's work",
-        ),
-        Measure(
-            "lost to the opening pads",
-            "their friction at the band's path",
-            float(100 * done.pads[-1] / total),
-            "%",
-            None,
-            "of the hand's work",
-        ),
     ]
 
 
 def section(bench: Bench) -> Theme:
     done = balance(bench)
-    pictures = {}
-    if bench.figures:
-        figures.balance(bench.figures / "energy.png", done)
-        pictures["energy.png"] = (
-            "Where the hand's work goes: a pull of 0.35 m in 4 s, a pause, the release at 8 s, and"
-            " (right) the first 100 ms after it."
-        )
     return Theme(
         "Energy of a pull, hold and release",
         checks(done),
@@ -280,5 +226,4 @@ def section(bench: Bench) -> Theme:
         " reference's energies and forces. What the hand puts in is stored or dissipated but for"
         " what the steps lose: what inertia and elastic forces do in a step, less the change of"
         " their energies.",
-        pictures,
     )

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +17,7 @@ class Measure:
         name: What is compared.
         against: What it is held against: a closed form, the reference, finer steps.
         value: How far off it is, or the figure itself, in `unit`.
-        limit: The most it may be; None states the figure only.
+        limit: The most it may be.
         note: What a reader of the figure should know.
     """
 
@@ -26,19 +25,13 @@ class Measure:
     against: str
     value: float
     unit: str
-    limit: float | None = None
+    limit: float
     note: str = ""
 
     @property
-    def met(self) -> bool | None:
-        """Whether the figure keeps its limit; what is no number never does. None without limit."""
-        if self.limit is None:
-            return None
+    def met(self) -> bool:
+        """Whether the figure keeps its limit; what is no number never does."""
         return bool(math.isfinite(self.value) and self.value <= self.limit)
-
-    @property
-    def entry(self) -> dict:
-        return asdict(self) | {"met": self.met}
 
 
 @dataclass(frozen=True)
@@ -47,32 +40,22 @@ class Theme:
 
     Attributes:
         text: Markdown before the table.
-        pictures: Files in reports/simulator/ and their captions.
-        details: What else reports/simulator.json keeps.
         not_run: Why there is nothing; empty where there is.
     """
 
     title: str
     checks: list[Measure]
     text: str = ""
-    pictures: dict[str, str] = field(default_factory=dict)
-    details: dict = field(default_factory=dict)
     not_run: str = ""
 
 
 @dataclass(frozen=True)
 class Bench:
-    """Where checks run.
-
-    Attributes:
-        params: params.yaml.
-        figures: Folder for pictures; None draws none.
-    """
+    """Where checks run; `params` is params.yaml."""
 
     params: object
     device: str = "cpu"
     workers: int = 1
-    figures: Path | None = None
 
     @property
     def on(self) -> dict:
@@ -87,4 +70,4 @@ def off(value, expected) -> float:
 
 
 def unmet(checks: Iterable[Measure]) -> list[Measure]:
-    return [check for check in checks if check.met is False]
+    return [check for check in checks if not check.met]

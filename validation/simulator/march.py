@@ -9,34 +9,17 @@ import numpy as np
 from pipeline.simulator.records import Grip, Mode
 from validation.simulator.reference import ReferenceRod
 
+EXACT = 1e-11  # Newton's change below which a step is done [m]
 SMALL = 1e-30  # imaginary step: derivatives without cancellation
 
 
 @dataclass(frozen=True)
-class Driven:
-    """Nodes that hands lead, and how all begin.
-
-    Attributes:
-        nodes: Their numbers, shape (n,).
-        places: At the end of each step [m], shape (S, n, 3).
-        rates: Of all sections at the start, shape (L, 9).
-    """
-
-    nodes: np.ndarray
-    places: np.ndarray
-    rates: np.ndarray
-
-
-@dataclass(frozen=True)
 class March:
-    """States x and rates v after each step, shape (S, L, 9), the force on the hand (S, 3), and
-    what the branches of the law `rubber` carry (S, E, 9) [Pa].
-    """
+    """States x and rates v after each step, shape (S, L, 9), and the force on the hand (S, 3)."""
 
     x: np.ndarray
     v: np.ndarray
     force: np.ndarray
-    overstress: np.ndarray
 
 
 def march(
@@ -45,36 +28,29 @@ def march(
     start: np.ndarray,
     *,
     friction: float = np.inf,
-    direction=(0, 0, 0),
-    unrelaxed: float | np.ndarray = 0.0,
-    driven: Driven | None = None,
-    exact: float = 1e-11,
 ) -> March:
-    """Step `start` (L, 9), at rest where nothing is `driven`, through a schedule's records (S,).
+    """Step `start` (L, 9), at rest, through a schedule's records (S,).
 
     Args:
         friction: 2 times the coefficient of friction: with the normal force what two pads can hold.
-        direction: Of the pull that opening pads resist, until a held step says, shape (3,).
-        unrelaxed: What share of a stress at rest the branches carry besides: one, or each (9,).
-        exact: Newton's change below which a step is done [m].
     """
     middle, weights = rod.sling.middle, rod.branches
-    at_rest = np.broadcast_to(unrelaxed, len(weights))
     x1 = x2 = np.array(start, float)
-    v1 = v2 = np.zeros_like(x1) if driven is None else driven.rates
+    v1 = v2 = np.zeros_like(x1)
     drag = rod.value("air_drag") * replace(rod, payload=0.0).mass
     drag[:, 3:] = 0
-    offset, pull, direction = None, 0.0, np.asarray(direction, float)
-    xs, vs, forces, carried = [], [], [], []
+    offset, pull, direction = None, 0.0, np.zeros(3)
+    xs, vs, forces = [], [], []
     overstress = np.zeros((rod.sling.edges, len(weights)))
     stress = rod.uniaxial(rod.stretch(rod.columns(x1)))  # at the last step's end
     worst = np.broadcast_to(rod.worst, rod.sling.edges)
-    for number, step in enumerate(steps):
+    for step in steps:
         h, past, grip, target = (step[name] for name in ("h", "past", "grip", "target"))
         bh = step["beta"] * h
         relax = step["mode"] == Mode.RELAX  # from rest, whatever was before
-        forget, follow = rod.update(step, overstress, at_rest if relax else None)
-        stress = 0 * stress if relax else stress
+        forget, follow = rod.update(step, overstress)
+        if relax:
+            forget, follow, stress = 0 * forget, 0 * follow, 0 * stress
         band = replace(
             rod,
             share=step["bending"],
@@ -91,9 +67,6 @@ def march(
             free[middle, :3] = False
         else:
             offset = None
-        if driven is not None:
-            at[driven.nodes, :3] = driven.places[number]
-            free[driven.nodes, :3] = False
         y = x1 + past * (x1 - x2)
         inertial = y + bh * (v1 + past * (v1 - v2))
         inertial[:, 2] -= bh**2 * rod.gravity
@@ -108,7 +81,7 @@ def march(
             force[..., middle, :3] += held_back
             return force
 
-        x = solve(residual, at, free, exact)
+        x = solve(residual, at, free)
         force = -residual(x)[middle, :3]
         if grip == Grip.HELD:
             pull = np.linalg.norm(force)
@@ -124,8 +97,8 @@ def march(
         change, stress = -stress, rod.uniaxial(stretch)
         overstress = forget * overstress + np.outer(stress + change, follow)
         worst = np.maximum(rod.worst if relax else worst, rod.pulled(stretch))
-        xs.append(x), vs.append(v1), forces.append(force), carried.append(overstress)
-    return March(*map(np.array, (xs, vs, forces, carried)))
+        xs.append(x), vs.append(v1), forces.append(force)
+    return March(*map(np.array, (xs, vs, forces)))
 
 
 def _free(rod: ReferenceRod) -> np.ndarray:
@@ -136,7 +109,7 @@ def _free(rod: ReferenceRod) -> np.ndarray:
     return free
 
 
-def solve(residual, start: np.ndarray, free: np.ndarray, exact: float = 1e-11) -> np.ndarray:
+def solve(residual, start: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Newton's method from `start` on the `free` ones, down the step's potential.
 
     A residual is that potential's gradient. Where the Hessian is not positive, its diagonal is
@@ -155,7 +128,7 @@ def solve(residual, start: np.ndarray, free: np.ndarray, exact: float = 1e-11) -
                 break
             scale /= 2
         x = after
-        if np.abs(step).max() < exact:  # the next one would be rounding
+        if np.abs(step).max() < EXACT:  # the next one would be rounding
             return x
     raise ArithmeticError("the reference's Newton method did not converge")
 

@@ -109,19 +109,12 @@ class ReferenceRod:
         times = np.broadcast_to(1 / TIMES, (*overstress.shape[:-1], len(TIMES)))
         return np.concatenate([times, flow], axis=-1)
 
-    def update(
-        self, step: np.void, overstress: np.ndarray, unrelaxed: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def update(self, step: np.void, overstress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What branches keep of their overstress (E, 9) [Pa] over a step, and take of p's change.
-
-        Args:
-            unrelaxed: Of a step that begins from rest: the share (9,) of its stress that they take.
 
         Returns:
             Shapes (E, 9) and (9,).
         """
-        if unrelaxed is not None:
-            return 0 * overstress, unrelaxed
         flow = 1 / (1 + step["h"] * self.fading(overstress)[:, -1:])
         forget = np.broadcast_to(step["forget"], (len(flow), len(TIMES)))
         return np.hstack([forget, flow]), np.append(step["follow"], 1.0)

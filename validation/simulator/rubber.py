@@ -6,33 +6,23 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import expm
-from scipy.optimize import least_squares
 
 from pipeline.identify.objective.box import SearchBox
-from pipeline.params.identification import parameter_names
 from pipeline.simulator.initial import drawn_guess
 from pipeline.simulator.model import ClampedBand, LaunchHistory
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip
-from pipeline.simulator.rubber import RUBBER, TIMES
+from pipeline.simulator.rubber import RUBBER
 from pipeline.simulator.schedule import steps
-from validation.simulator import agreement, energy, launching, robustness
-from validation.simulator.at_rest import STRING
+from validation.simulator import agreement, damping, energy, launching, robustness
 from validation.simulator.closed import (
     flow_integral,
     integral,
     left_of,
-    oscillation,
-    relaxed_share,
-    slope,
     stress,
 )
-from validation.simulator.damping import STATES, oscillate, random_states
 from validation.simulator.experiment import (
-    TIGHT,
     band_of,
-    launched,
     move,
     settling,
     setup_of,
@@ -40,7 +30,6 @@ from validation.simulator.experiment import (
     straight_guess,
 )
 from validation.simulator.finding import Bench, Measure, Theme, off
-from validation.simulator.reference import ReferenceRod
 
 SHAPES = (-0.3, 0.2), (0.3, 0.0), (0.9, 0.05)  # Mooney's share and the upturn
 BOX = {
@@ -54,10 +43,10 @@ BOX = {
 RELAXATION, SOFTENING = 0.04, 0.3
 FLOW, LOG_FLOW_RATE = 0.25, 2.5
 SHAPE = 0.3, 0.1
-PULL_LIMIT, INTEGRAL_LIMIT, FREQUENCY_LIMIT, DECAY_LIMIT = 0.1, 2.0, 1.0, 2.0  # percent
+PULL_LIMIT, INTEGRAL_LIMIT = 0.1, 2.0  # percent
 THIN = 40  # times thinner than the band: no beam any more
 FULL = 0.4999  # Poisson's ratio of a volume that hardly changes
-ROUNDING = 1e-9
+FORMULAS = ((1, "recoil_step"),)  # of the steps that never gain energy
 HISTORY = LaunchHistory(pull_time=4.0, pause=2.0)
 SEED = 5
 
@@ -199,84 +188,6 @@ def _of_histories(
     return checks
 
 
-def oscillator(bench: Bench, shape=SHAPE, stretch: float = 1.5) -> list[Measure]:
-    """A heavy middle, its memory relaxed where it is let go, by the matrix exponential."""
-    left, weight = relaxed_share(RELAXATION)
-    mass, theta = 0.5, [1e6, FULL, 1e-6, 0.5, 0.0]
-    sling, options = (
-        rubber_of(bench),
-        {"mass": mass, "stretch": stretch, **law_parameters(shape, softening=0.0, flow=0.0)},
-    )
-    time, place, _, _ = oscillate(bench, theta, sling=sling, **options)
-    thin = replace(sling, radius=sling.radius / STRING, mass=sling.mass / 20)
-    mu = left * theta[0] / (2 * (1 + FULL))
-    k = 4 * thin.area / thin.rest_length * mu * slope(stretch, shape)
-    moving = mass + thin.mass / 3
-    rates = np.zeros((10, 10))  # of place, speed, and what the branches carry of k x
-    rates[0, 1], rates[1, 0], rates[1, 2:] = 1, -k / moving, -k * weight / moving
-    rates[2:, 1], rates[2:, 2:] = 1, -np.diag(1 / TIMES)
-    step, state, summary = expm(rates * time[1]), np.append(place[0], np.zeros(9)), []
-    for _ in time:
-        summary.append(state[0])
-        state = step @ state
-
-    def modes(place: np.ndarray) -> tuple[float, float]:
-        def miss(share: np.ndarray) -> np.ndarray:
-            return oscillation(time, moving, share[0] * k, share[1] * 0.1, place[0]) - place
-
-        fit = least_squares(miss, [1.0, 1.0], xtol=1e-12, ftol=1e-12)
-        decay = fit.x[1] * 0.1 / (2 * moving)
-        return float(np.sqrt(fit.x[0] * k / moving - decay**2) / (2 * np.pi)), float(decay)
-
-    checks = []
-    against = "m x'' + k (x + w Σ o) = 0, o' = x' − o/t, by the matrix exponential"
-    both = zip(modes(place), modes(np.array(summary)), strict=True)
-    for (name, limit, unit), (estimate, other) in zip(
-        (("frequency", FREQUENCY_LIMIT, "Hz"), ("decay", DECAY_LIMIT, "/s")), both, strict=True
-    ):
-        note = (
-            f"{estimate:.4g} {unit}, closed form {other:.4g} {unit}; both as one damped oscillation"
-        )
-        where = f"{name} of a heavy middle, damped by relaxation alone"
-        checks.append(Measure(where, against, off(estimate, other), "%", limit, note))
-    return checks
-
-
-def growth(bench: Bench, count: int = 16, kinds=tuple(STATES)) -> list[Measure]:
-    """Elastic, kinetic and the branches' energy after random states, relaxed there, are let go."""
-    rng, worst, retained = np.random.default_rng(SEED), 0.0, 0
-    for kind in kinds:
-        thetas = agreement.random_thetas(bench, count, SEED)
-        starts = random_states(band_of(bench), kind, count, rng)
-        for theta, start in zip(thetas, starts, strict=True):
-            shape = rng.uniform(-0.3, 0.9), rng.uniform(0, 0.3)
-            memory = (rng.uniform(*BOX[name]) for name in [*BOX][2:])
-            beside = dict(zip(BOX, (*shape, *memory), strict=True))
-            parameters = Parameters.of(RUBBER, theta, **beside)
-            sling = rubber_of(bench)
-            sling = straight(sling, sling.rest_length)
-            table = launched(bench.params.sling.recoil_step, 60, 1)
-            motion = move(bench, sling, parameters, table, start, gravity=0.0, **TIGHT)
-            if motion.failed[0]:
-                continue
-            rod, retained = ReferenceRod(sling, parameters, gravity=0.0), retained + 1
-            memory = energy.remembered(rod, table, motion.start[0], motion.x[0])
-            band = replace(rod, worst=memory.worst[1:])
-            total = band.elastic(motion.x[0]) + rod.kinetic(motion.v[0]) + memory.free
-            total = np.append(rod.elastic(motion.start[0]), total)
-            worst = max(worst, float(np.diff(total).max() / total[0]))
-    return [
-        Measure(
-            "rise of elastic, kinetic and branches' energy in any one step, backward Euler",
-            "energy never grows without work",
-            worst,
-            "of the start",
-            ROUNDING,
-            f"{retained} of {count * len(kinds)} random states, of BOX; others are marked failed",
-        )
-    ]
-
-
 def slack(bench: Bench) -> list[Measure]:
     """A band that relaxed while drawn and is led back to its rest length pushes the hand no more.
 
@@ -336,53 +247,26 @@ def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Measure]:
             0.5,
             f"{done.hold_force[0]:.3f} N; {none.hold_force[0]:.3f} N without memory",
         ),
-        Measure(
-            "landing with a history against one that has forgotten all",
-            "—",
-            float(100 * (done.landing_y[0] / none.landing_y[0] - 1)),
-            "%",
-            None,
-            f"{done.landing_y[0]:.3f} m and {none.landing_y[0]:.3f} m",
-        ),
     ]
 
 
-def random_points(bench: Bench, count: int) -> Parameters:
+def random_points(bench: Bench, count: int, law: str = RUBBER) -> Parameters:
     """Random points of the box in params.yaml, and of BOX for what the law adds."""
-    box = SearchBox.of(bench.params.parameters, bounds=BOX, law=RUBBER)
+    box = SearchBox.of(bench.params.parameters, bounds=BOX if law == RUBBER else {}, law=law)
     unit = np.random.default_rng(SEED).random((count, box.dimension))
     return box.parameters(box.to_physical(unit))
 
 
-def survey(bench: Bench, count: int = 10_000, progress=print) -> tuple[list[Measure], dict]:
+def survey(bench: Bench, count: int = robustness.COUNT) -> list[Measure]:
     sling = replace(rubber_of(bench), grip_force=robustness.HELD_FAST)
-    counts = robustness.survey(bench, sling, random_points(bench, count), progress)
-    names = parameter_names(RUBBER)
-    failed = robustness.ranges(counts["unconverged"], names) if counts["unconverged"] else ""
-    return [
-        Measure(
-            f"not finite, though not marked failed, of {count} random points, negative shares among"
-            " them",
-            "0",
-            float(counts["not_finite"]),
-            "θ",
-            0.0,
-        ),
-        Measure(
-            f"unconverged, and marked so, of {count} random points, held fast",
-            "0, or marked failed with a reason",
-            float(len(counts["unconverged"])),
-            "θ",
-            robustness.ALLOWED * count / robustness.COUNT,
-            failed,
-        ),
-    ], counts
+    surveyed = robustness.survey(bench, sling, random_points(bench, count))
+    where = f"{count} random points, negative shares among them, held fast"
+    return robustness.checks(surveyed, where, robustness.ALLOWED * count / robustness.COUNT)
 
 
-def section(bench: Bench, count: int = 10_000, progress=print) -> Theme:
+def section(bench: Bench) -> Theme:
     sling = rubber_of(bench)
     balance = energy.balance(bench, sling=sling, **law_parameters())
-    surveyed, counts = survey(bench, count, progress)
     return Theme(
         "The law `rubber`",
         [
@@ -390,20 +274,16 @@ def section(bench: Bench, count: int = 10_000, progress=print) -> Theme:
             *cycle(bench),
             *relaxation(bench),
             *flow(bench),
-            *oscillator(bench),
             *agreement.checks(bench, 2, sling=sling, **law_parameters()),
             *energy.checks(balance),
-            *growth(bench),
+            *damping.growth(bench, sling, random_points(bench, damping.COUNT), FORMULAS),
             *slack(bench),
             *histories(bench),
-            *launching.convergence(
-                bench, progress=progress, sling=sling, history=HISTORY, **law_parameters()
-            ),
-            *surveyed,
+            *launching.convergence(bench, sling=sling, history=HISTORY, **law_parameters()),
+            *survey(bench),
         ],
         "Mooney's share m, the upturn c, softening s, eight relaxing branches and one that flows"
         " beside the neo-Hookean material (`pipeline/simulator/rubber.h`). E is the modulus after"
         " ten seconds, without flow."
         " Softening and each branch have a free energy; what they lose takes part in the balance.",
-        details={"survey": counts},
     )

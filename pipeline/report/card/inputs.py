@@ -85,6 +85,11 @@ class CardInputs:
         return self.theta.get("confidence") or {}
 
     @property
+    def launches(self) -> int:
+        """Number of launches that are evidence."""
+        return len(self.confidence.get("launches", []))
+
+    @property
     def recordings(self) -> list[str]:
         return list(dict.fromkeys(recorded.metadata["input"]["file"] for recorded in self.episodes))
 

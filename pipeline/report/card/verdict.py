@@ -157,6 +157,36 @@ def question(findings: Findings) -> str:
     )
 
 
+def reasons_of(findings: Findings, reasons: list[Reason]) -> list[str]:
+    """Sentences: what speaks against; of a trusted band, why it can be trusted."""
+    if reasons:
+        return [reason.text for reason in sorted(reasons, key=lambda reason: not reason.against)]
+    notes = [
+        f"The fit settled, and the simulation meets the recording: {_met(findings)}.",
+        f"Launches stretch the band to {findings.stretch:.2f} times its length, within the recorded"
+        f" {findings.recorded_stretch:.2f}.",
+        f"Landings are known to ±{100 * findings.half_width:.0f} cm or better.",
+    ]
+    if findings.scores:
+        notes.append(inside(findings))
+    if not findings.unloaded:
+        notes.append(
+            "No recording lets the drawn band back, so that softening and flow keep their priors:"
+            " launches tell what they leave."
+        )
+    if findings.observed == 1:
+        notes.append("One launch is part of the evidence; one is not many.")
+    return notes
+
+
+def _met(findings: Findings) -> str:
+    recoil = f", the recoil within {1000 * findings.recoil:.1f} mm" if findings.recoil_seen else ""
+    return (
+        f"the force within {findings.force:.2f} N, the band in the hand within"
+        f" {1000 * findings.held:.1f} mm{recoil}"
+    )
+
+
 def inside(findings: Findings) -> str:
     """How many scored launches landed inside their intervals, and how far off in the mean."""
     if findings.scores == 1:

@@ -9,60 +9,43 @@ import numpy as np
 
 from pipeline.base.files import replacing_folder, write_json, write_text
 from pipeline.base.layout import Layout
-from pipeline.identify.posterior.gain import LandingModel
 from pipeline.params import Params
 from pipeline.report.card import figures
 from pipeline.report.card.animation import animate
 from pipeline.report.card.camera import Pictures
-from pipeline.report.card.findings import findings
+from pipeline.report.card.conclusion import Conclusion
 from pipeline.report.card.inputs import CardInputs, card_inputs
-from pipeline.report.card.next_steps import next_steps
 from pipeline.report.card.simulated import simulate
-from pipeline.report.card.text import card_text, reasons_of
-from pipeline.report.card.values import boxes, values
-from pipeline.report.card.verdict import judge, question
+from pipeline.report.card.text import card_text
+from pipeline.report.card.values import boxes
 from pipeline.report.drawing.page import page
 
 
 def write(params: Params, band: str, method: str, root: str | Path = ".") -> dict:
     """Write a band's card; return what card.json says. Raises UserError: an input is missing."""
     inputs = card_inputs(params, band, method, root)
-    episode, setup, method_params = inputs.episode, params.setup, params.methods[method]
+    episode, setup = inputs.episode, params.setup
     layout = Layout(Path(root))
     recording = layout.raw(band) / episode.metadata["input"]["file"]
     pictures = Pictures.of(recording, episode, setup)
     simulated = simulate(params, band, method, episode, inputs.theta)
 
-    card_findings = findings(inputs, simulated.force)
-    verdict, against = judge(card_findings)
-    reasons, shown = reasons_of(card_findings, against), values(inputs.theta, method_params.fixed)
-    aims = inputs.aims
-    model, samples, spread = None, inputs.samples, aims.spread
-    if samples is not None and spread.chosen is not None:
-        landings = spread.chosen, spread.centres, spread.slope, aims.half_width
-        model = LandingModel.of(samples.names, samples.values, *landings)
-    launches = len(inputs.confidence.get("launches", []))
-    evidence = inputs.episodes, launches, question(card_findings)
-    steps = next_steps(
-        band, against, model, aims.target, *evidence, unloaded=card_findings.unloaded
-    )
-    card = content(inputs, verdict, reasons, shown, steps)
-    text = inputs, card_findings, verdict, reasons, shown, steps
-
+    concluded = Conclusion.of(inputs, simulated.force)
+    card = content(inputs, concluded)
     with replacing_folder(layout.card(band)) as folder:
         figures.camera(folder / "camera.webp", episode, simulated, pictures)
         figures.force(folder / "force.png", episode, simulated)
-        figures.values(folder / "values.png", shown, boxes(params, method))
+        figures.values(folder / "values.png", concluded.values, boxes(params, method))
         figures.landings(folder / "landings.png", inputs)
         animate(folder / "animation.webp", episode, simulated, pictures, setup.fork_width)
-        write_text(folder / "README.md", card_text(*text))
+        write_text(folder / "README.md", card_text(inputs, concluded))
         write_json(folder / "card.json", card)
-        alone = page(card_text(*text, linked=False), folder, f"{band}: {verdict}")
-        write_text(folder / "index.html", alone)
+        text = card_text(inputs, concluded, linked=False)
+        write_text(folder / "index.html", page(text, folder, f"{band}: {concluded.verdict}"))
     return card
 
 
-def content(inputs: CardInputs, verdict: str, reasons: list, shown: list, steps: list) -> dict:
+def content(inputs: CardInputs, concluded: Conclusion) -> dict:
     """What card.json says; numbers are rounded, so that kinds of CPU agree."""
     aims = inputs.aims
     draws = [
@@ -82,15 +65,15 @@ def content(inputs: CardInputs, verdict: str, reasons: list, shown: list, steps:
     return {
         "band": inputs.band,
         "method": inputs.method,
-        "verdict": verdict,
-        "reasons": reasons,
-        "values": [asdict(value) for value in shown],
+        "verdict": concluded.verdict,
+        "reasons": concluded.reasons,
+        "values": [asdict(value) for value in concluded.values],
         "draws": draws,
-        "next": steps,
+        "next": concluded.steps,
         "theta_file": Layout().theta(inputs.band, inputs.method).as_posix(),
         "recordings": len(inputs.recordings),
         "pulls": len(inputs.episodes),
-        "launches": len(inputs.confidence.get("launches", [])),
+        "launches": inputs.launches,
     }
 
 

@@ -100,14 +100,14 @@ def test_the_loss_factors_prior_pulls_towards_it_and_no_farther(first):
 
 
 def test_intervals_hold_the_truth_and_two_recordings_narrow_them(first, both):
+    """The width is the fit's: that of some 150 effective samples differs by 8 % by chance."""
     single, double = (told_of(result)["parameters"] for result in (first, both))
     for name in parameter_names(SLING.law):
         value = TRUTH.sample()[name]
         for interval in (single[name], double[name]):
             assert interval["low"] <= value * (1 + 1e-9) and value * (1 - 1e-9) <= interval["high"]
-    widths = [intervals["youngs_modulus"] for intervals in (single, double)]
-    widths = [interval["high"] - interval["low"] for interval in widths]
-    assert widths[1] < 0.85 * widths[0]
+    deviations = [np.sqrt(np.linalg.inv(result.fit.hessian)[0, 0]) for result in (first, both)]
+    assert deviations[1] < 0.85 * deviations[0]
 
 
 def test_alike_recordings_agree(both):

@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 
 from pipeline.report.card.findings import carried, findings
-from pipeline.report.card.text import reasons_of
-from pipeline.report.card.verdict import CARE, NO, TRUSTED, Findings, judge, question
+from pipeline.report.card.verdict import (
+    CARE,
+    NO,
+    TRUSTED,
+    Findings,
+    judge,
+    question,
+    reasons_of,
+)
 from tests.report.card.conftest import trials
 
 GOOD = Findings(

@@ -77,15 +77,12 @@ def launches() -> pd.DataFrame:
     )  # fmt: skip
 
 
-def confidence(fixed: str | None = None) -> dict:
+def confidence() -> dict:
     """What a θ file says of its confidence; friction cannot be identified."""
     parameters = {
         name: {"low": 0.9 * value, "high": 1.1 * value, "identifiable": name != "dynamic_friction"}
         for name, value in THETA.items()
     }
-    if fixed:
-        parameters[fixed] = {"low": THETA[fixed], "high": THETA[fixed], "identifiable": False}
-        parameters[fixed]["fixed"] = True
     matrix = np.eye(5)
     matrix[0, 1] = matrix[1, 0] = -0.9
     return {
@@ -162,7 +159,8 @@ def no_simulation(monkeypatch) -> None:
 @pytest.fixture
 def text_alone(monkeypatch) -> None:
     """Pictures and the page take seconds, and tell a test of the text nothing."""
-    monkeypatch.setattr(reporting.Report, "picture", lambda _, name, *__: f"{name}.png")
+    shown = lambda _, name, alt, *__: f"![{alt}](figures/{name}.png)\n"  # noqa: E731
+    monkeypatch.setattr(reporting.Report, "picture", shown)
     monkeypatch.setattr(writing, "write_page", lambda *_: None)
 
 

@@ -8,6 +8,8 @@ from pipeline.report.run import write as writing
 from tests.edited import outcomes
 from tests.report.run.conftest import BAND, METHOD
 
+pytestmark = pytest.mark.slow
+
 FILES = {
     "theta": f"data/theta/{BAND}/{METHOD}.json",
     "regions": f"data/clusters/{BAND}/{METHOD}.json",

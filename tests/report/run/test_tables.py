@@ -1,10 +1,12 @@
-"""Tables from constructed launches whose means are known by hand."""
+"""Numbers of the tables, by hand; how they are printed, golden/ has."""
 
 import math
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from pipeline.identify.objective.box import SearchBox
 from pipeline.report.run.tables.cells import markdown
 from pipeline.report.run.tables.landings import (
     Coverage,
@@ -13,6 +15,7 @@ from pipeline.report.run.tables.landings import (
     prediction_error,
     predictions,
 )
+from pipeline.report.run.tables.parameters import at_edge
 
 
 def trials(rows: list[tuple], kind: str = "measured") -> pd.DataFrame:
@@ -49,11 +52,6 @@ def test_landing_errors_by_hand() -> None:
     assert total.within == pytest.approx(math.sqrt((0.02**2 / 2 + 0.04**2 / 2) / 2))
     deviations = [0.01 - 0.07, 0.03 - 0.07, 0.10 - 0.07, 0.14 - 0.07]
     assert total.std == pytest.approx(math.sqrt(sum(d**2 for d in deviations) / 3))
-
-
-def test_all_failed_has_no_mean() -> None:
-    errors = landing_errors(trials([(1.9, math.nan, "fell", 1.9, 1.4)] * 3))
-    assert errors["all"].failed == 3 and math.isnan(errors["all"].mean)
 
 
 def test_prediction_error_inside_and_beyond() -> None:
@@ -107,3 +105,11 @@ def test_coverage_of_the_predicted_intervals() -> None:
     assert parts["inside"].width == pytest.approx((0.15 + 0.05) / 2)
     assert parts["beyond"] == Coverage(launches=1, covered=1, width=0.25)
     assert "| 1.950 – 2.250 |" in markdown(predictions(ranged))
+
+
+def test_edge_of_the_box_on_both_scales() -> None:
+    box = SearchBox(
+        ("d", "s"), np.array([1e-4, 0.0]), np.array([1e-2, 1.0]), np.array([True, False])
+    )
+    assert at_edge(1.01e-4, "d", box) and not at_edge(1.2e-4, "d", box) and at_edge(1e-2, "d", box)
+    assert at_edge(0.995, "s", box) and not at_edge(0.98, "s", box)

@@ -33,7 +33,6 @@ class Evaluation:
         terms: Each loss term, shape (N,); NaN where the rollout failed.
         total: Weighted sum of the terms, shape (N,); +inf where the rollout failed.
         failure: None or the reason, length N.
-        seconds: What it took.
     """
 
     unit: np.ndarray
@@ -41,7 +40,6 @@ class Evaluation:
     terms: dict[str, np.ndarray]
     total: np.ndarray
     failure: list[str | None]
-    seconds: float = 0.0
 
 
 class Evaluator:

@@ -221,13 +221,12 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
         for file in (project.folder / "reports").rglob("*")
         if file.is_file() and file.name != "run.js"  # when and where
     }
-    shutil.rmtree(project.folder / ".checkpoints", ignore_errors=True)
     ran = project.dvc(
         "repro",
         "--force",
         "--no-run-cache",
         "--downstream",
-        "history@band1-sling2sim2real",  # of one phase: tests/identify/objective/test_cache.py
+        "history@band1-sling2sim2real",  # of one phase: tests/identify/search/test_loop.py
     )
     assert ran == {*of_method(PAPER), "report"}
     assert (project.folder / "dvc.lock").read_text() == before

@@ -72,10 +72,6 @@ def depth(picture: Picture) -> np.ndarray:
         if floats and pixels.dtype != np.float32:
             raise Unsupported(f"depth format {picture.format!r} is not known, use compressedDepth")
         return _metres(pixels)
-    if "rvl" in picture.format.lower():
-        raise Unsupported(
-            f"depth format {picture.format!r} is not known, use compressedDepth in PNG"
-        )
     body = _body(picture.data)
     if len(body) == len(picture.data) and floats:
         raise Unsupported(
@@ -84,6 +80,8 @@ def depth(picture: Picture) -> np.ndarray:
         )
     if not len(body):
         raise Undecodable("compressedDepth without a picture")
+    if "rvl" in picture.format.lower():
+        raise Unsupported("compressedDepth in RVL is not read: record it in PNG")
     packed = unpacked(body, cv2.IMREAD_UNCHANGED, picture.format)
     if not floats:
         return _metres(packed)

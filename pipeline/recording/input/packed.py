@@ -12,7 +12,7 @@ from PIL import Image
 
 FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "BMP", "JPEG2000", "AVIF")  # of what OpenCV unpacks
 KNOWN = "JPEG, PNG, WebP, TIFF, BMP, JPEG 2000 or AVIF"
-ENDS = {"JPEG": b"\xff\xd9", "PNG": b"IEND"}  # without it OpenCV may fill a picture up
+JPEG_END = b"\xff\xd9"  # behind it is what a driver sends of its buffer
 LARGEST = 2**24  # pixels; a damaged size must not ask for more memory than this
 
 
@@ -56,8 +56,10 @@ def unpacked(data: np.ndarray, flags: int, kind: str) -> np.ndarray:
     (width, height), _, format = header(data)
     if width * height > LARGEST:
         raise Undecodable(f"an image of {width} x {height} pixels ({kind})")
-    if ENDS.get(format, b"") not in data.tobytes():
-        raise Undecodable(f"{format} is cut off ({kind})")
+    if format == "JPEG" and JPEG_END not in data.tobytes():  # OpenCV may fill it up with grey
+        raise Undecodable(f"JPEG is cut off ({kind})")
+    if format == "PNG":
+        _expect_whole(data, kind)
     level = logging.setLogLevel(logging.LOG_LEVEL_SILENT)  # what it would say is said here
     try:
         image = cv2.imdecode(data, flags)
@@ -68,3 +70,12 @@ def unpacked(data: np.ndarray, flags: int, kind: str) -> np.ndarray:
     if image is None:
         raise Undecodable(f"damaged {format} ({kind})")
     return image
+
+
+def _expect_whole(data: np.ndarray, kind: str) -> None:
+    """A PNG's chunks and their checksums, which OpenCV does not look at. Raises Undecodable."""
+    try:
+        with Image.open(io.BytesIO(data.data), formats=("PNG",)) as image:
+            image.verify()
+    except Exception as error:  # damaged bytes make Pillow raise anything
+        raise Undecodable(f"damaged PNG ({kind})") from error

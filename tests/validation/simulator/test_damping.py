@@ -1,7 +1,7 @@
 """No rates gain energy."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.simulator.parameters import Parameters
@@ -14,7 +14,6 @@ from validation.simulator.reference import ReferenceRod
 
 
 def test_no_rates_gain_energy_in_random_states(bench: Bench):
-    @settings(max_examples=36, deadline=None, derandomize=True)
     @given(
         st.sampled_from(sorted(STATES)), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.5, 1.0])
     )

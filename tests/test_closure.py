@@ -31,7 +31,6 @@ MAY_SEE_THE_RIG = {
     "stages/record.py",
     "stages/launches.py",
     "stages/floor.py",
-    "validation/engines/physx/policy.py",  # whose draws it launches there, after all else
 }
 OPTIMIZERS = {"history": ("de", "design"), "de": ("de",), "bo": ("bo",), "adam": ("adam",)}
 ORACLE = "rig/oracle/"

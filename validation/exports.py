@@ -1,26 +1,21 @@
 """`python -m validation.exports [--to newton] [BAND...]`: reports/validation/export-<target>.json.
 
 Each band that a run has identified is exported to MuJoCo or Newton and replayed there, on the CPU
-(Newton also on the GPU that SLING_DEVICE names: export-newton-gpu.json); or to PhysX, on a GPU. On
-several GPUs each has a band of its own. The report is written anew after each band, so that one
-that was killed has those before.
+(Newton also on the GPU that SLING_DEVICE names: export-newton-gpu.json); or to PhysX, on a GPU. The
+report is written anew after each band, so that one that was killed has those before.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import tempfile
-from collections.abc import Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from importlib.metadata import version
-from multiprocessing import get_context
 from pathlib import Path
 
 from pipeline.base import errors
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
-from pipeline.base.machine import devices, gpus
+from pipeline.base.machine import devices
 from pipeline.episode.episode import Episode
 from pipeline.export.card import ASKED
 from pipeline.params import load
@@ -49,48 +44,16 @@ def main() -> None:
     name = f"{target}-gpu" if target == "newton" and device != "cpu" else target
     path, bands = Path(REPORT.format(name)), args.bands or list(load().run.bands)
     versions = {name: version(name) for name in packages}
-    for band, card in _cards(target, bands, device):
+    for band in bands:
+        card = exported(target, band)
         cards[band] = {name: card[name] for name in KEPT if name in card}
         print(f"{band}: {'met' if card['met'] else 'NOT met'}", flush=True)
         content = {
             "asked": ASKED,
             "met": len(cards) == len(bands) and all(row["met"] for row in cards.values()),
-            "bands": {name: cards[name] for name in bands if name in cards},
+            "bands": cards,
         }
         write_report(path, content, arguments, device=device, versions=versions)
-
-
-def _cards(target: str, bands: list[str], device: str) -> Iterator[tuple[str, dict]]:
-    """Export the bands, on all GPUs; a band and its card, as soon as it is made."""
-    places = [0] if device == "cpu" else list(range(len(gpus())))
-    if target == "newton" and device != "cpu":
-        places *= len(bands)  # its steps are short: they wait for Python, not for the GPU
-    places = places[: len(bands)]
-    if len(places) < 2:
-        yield from ((band, exported(target, band)) for band in bands)
-        return
-    context = get_context("spawn")
-    free = context.Queue()
-    for number in places:
-        free.put(number)
-    with ProcessPoolExecutor(len(places), context, initializer=_take_gpu, initargs=(free,)) as pool:
-        started = {pool.submit(exported, target, band): band for band in bands}
-        ended = list[Future]()
-        for done in as_completed(started):
-            ended.append(done)
-            if done.exception() is None:
-                yield started[done], done.result()
-    for done in ended:
-        done.result()  # raises what a band failed of, after the others
-
-
-def _take_gpu(free) -> None:
-    """Leave this process one GPU alone, which PhysX then takes for the first."""
-    seen = os.environ.get("CUDA_VISIBLE_DEVICES")
-    number = free.get()
-    os.environ["CUDA_VISIBLE_DEVICES"] = seen.split(",")[number] if seen else str(number)
-    if os.environ.get("SLING_DEVICE", "cpu") != "cpu":
-        os.environ["SLING_DEVICE"] = "cuda"  # its name among those that this process sees
 
 
 def exported(target: str, band: str) -> dict:

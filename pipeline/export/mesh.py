@@ -72,29 +72,19 @@ class Tube:
         """The section in the hand."""
         return len(self.rest) // 2
 
-    def elastic_force(self, positions: np.ndarray, theta) -> np.ndarray:
-        """Force of the stretched band on each vertex [N], like `positions` (sections, V, 3).
+    @property
+    def ends(self) -> np.ndarray:
+        """Nodes in the clamps, shape (E,)."""
+        return self._rows[[0, 1, -2, -1]].ravel()
 
-        The law of material.h: nominal stress P = mu F + (lam (J - 1) - mu) cof F in each
-        tetrahedron.
-        """
-        young, poisson = theta[:2]
-        mu = young / (2 * (1 + poisson))
-        lam = young * poisson / ((1 + poisson) * (1 - 2 * poisson)) + mu
-        before, now = (
-            np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-            for corners in (v.reshape(-1, 3)[self.tetrahedra] for v in (self.rest, positions))
-        )
-        inverse = np.linalg.inv(before)
-        gradient = now @ inverse
-        ratio = np.linalg.det(gradient)[:, None, None]
-        cofactor = ratio * np.swapaxes(np.linalg.inv(gradient), 1, 2)
-        stress = mu * gradient + (lam * (ratio - 1) - mu) * cofactor
-        shares = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
-        pull = -np.einsum("t,tij,tkj->tki", np.linalg.det(before) / 6, stress, shares)
-        force = np.zeros((len(self.mass), 3))
-        np.add.at(force, self.tetrahedra, pull)
-        return force.reshape(self.rest.shape)
+    @property
+    def hand(self) -> np.ndarray:
+        """Nodes of the section in the hand, shape (V,)."""
+        return self._rows[self.middle]
+
+    @property
+    def _rows(self) -> np.ndarray:
+        return np.arange(self.mass.size).reshape(self.rest.shape[:2])
 
 
 def hand_path(episode, times: np.ndarray, grasp: np.ndarray) -> np.ndarray:

@@ -78,20 +78,6 @@ class UsdBand:
         """Height of the clamps above the origin [m]."""
         return float(self.tube.clamped[[1, -2], 0, 2].mean())
 
-    @property
-    def ends(self) -> np.ndarray:
-        """Nodes in the clamps, shape (E,)."""
-        return self._rows[[0, 1, -2, -1]].ravel()
-
-    @property
-    def hand(self) -> np.ndarray:
-        """Nodes that a hand leads, shape (V,)."""
-        return self._rows[self.tube.middle]
-
-    @property
-    def _rows(self) -> np.ndarray:
-        return np.arange(self.tube.mass.size).reshape(self.tube.rest.shape[:2])
-
 
 @dataclass(frozen=True)
 class UsdMatch:
@@ -192,8 +178,8 @@ def nodes(band: UsdBand) -> dict:
     """Numbers of the nodes that are led, and places (V, 3) [m] of the hanging band."""
     return {
         "frame": export_values.FRAMES,
-        "ends": band.ends.tolist(),
-        "hand": band.hand.tolist(),
+        "ends": band.tube.ends.tolist(),
+        "hand": band.tube.hand.tolist(),
         "hanging_m": np.round(band.tube.clamped.reshape(-1, 3), 9).tolist(),
     }
 

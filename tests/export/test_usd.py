@@ -3,6 +3,7 @@
 import json
 import math
 import tomllib
+from collections import Counter
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,9 @@ import pytest
 from pipeline.base.imported import imported
 from pipeline.export import usd
 from pipeline.export.match import DrawCompared
+from pipeline.export.mesh import Tube
 from pipeline.export.usd import ON_PAPER, nominal
+from pipeline.simulator.cylinder import volumes
 from sling2sim2real import export
 from tests.project import ROOT
 
@@ -37,6 +40,19 @@ def test_its_law_is_hookes_when_small_and_stiffer_than_rubber_when_large() -> No
     large, incompressible = np.array([1.5, 2.0]), 0.499
     rubber = (large - large**-2) / 3
     assert (nominal(large, incompressible) > 1.1 * rubber).all()
+
+
+def test_the_surface_is_closed_and_seen_from_outside(model) -> None:
+    tube = Tube.of(model.sling, usd.EDGES, usd.GRADING)
+    faces = usd.surface(tube.tetrahedra)
+    edges = Counter(
+        edge for face in faces.tolist() for edge in zip(face, [*face[1:], face[0]], strict=True)
+    )
+    assert set(edges.values()) == {1}
+    assert all((b, a) in edges for a, b in edges)
+    corners = tube.rest.reshape(-1, 3)[faces]
+    volume = np.linalg.det(corners).sum() / 6  # positive where faces look outwards
+    assert volume == pytest.approx(volumes(tube.rest, tube.tetrahedra).sum())
 
 
 def test_it_says_that_nobody_has_run_it(done) -> None:
@@ -127,3 +143,10 @@ def test_a_launch_that_is_lost_in_the_engine_is_a_gap_in_the_card(
     assert "not as near as asked" in text and "Match it before" not in text
     blocks = text.split("\n\n")
     assert any(block.startswith("`toy.usda` has the scene") for block in blocks)
+
+
+def test_what_is_matched_is_what_lands_near_the_targets(model) -> None:
+    draws, _ = usd.near_draws(model)
+    near, far = model.settings.policy.targets
+    landing = model.launches(draws).landing_y
+    assert (landing > near / usd.NEAR).all() and (landing < far * usd.NEAR).all()

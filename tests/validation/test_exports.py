@@ -2,12 +2,10 @@
 
 import json
 import sys
-from queue import Queue
 
 import pytest
 
 from pipeline.base.errors import UserError
-from tests.project import ROOT
 from validation import exports, reports
 
 ROW = {"met": True, "engine": "an engine", "matched": [], "files": {}}
@@ -17,7 +15,6 @@ ROW = {"met": True, "engine": "an engine", "matched": [], "files": {}}
 def run(monkeypatch, tmp_path):
     """Run the command on bands whose export is a function of their name."""
     monkeypatch.setattr(exports, "REPORT", str(tmp_path / "{}.json"))
-    monkeypatch.setattr(exports, "gpus", lambda: ("cuda:0",))
     monkeypatch.setattr(reports, "environment", lambda *of: {"versions": {}})  # of a GPU
 
     def command(exported, *bands: str) -> dict:
@@ -46,25 +43,3 @@ def test_a_command_that_ends_early_has_written_the_bands_before(run, tmp_path) -
         run(exported, "one", "two")
     done = json.loads((tmp_path / "usd.json").read_text("utf-8"))
     assert list(done["bands"]) == ["one"] and done["met"] is False
-
-
-def test_each_gpu_has_a_band_of_its_own(monkeypatch) -> None:
-    """No band is exported here: there is no such run. But both were begun, each elsewhere."""
-    monkeypatch.setattr(exports, "gpus", lambda: ("cuda:0", "cuda:1"))
-    monkeypatch.chdir(ROOT)
-    with pytest.raises(UserError):
-        list(exports._cards("usd", ["no_such_band", "nor_this"], "cuda:0"))
-
-
-def test_a_process_sees_its_gpu_alone(monkeypatch) -> None:
-    free = Queue()
-    for number in (1, 0):
-        free.put(number)
-    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "4,7")
-    monkeypatch.setenv("SLING_DEVICE", "cuda:1")
-    exports._take_gpu(free)
-    assert exports.os.environ["CUDA_VISIBLE_DEVICES"] == "7"
-    assert exports.os.environ["SLING_DEVICE"] == "cuda"  # CUDA sees one alone
-    monkeypatch.delenv("CUDA_VISIBLE_DEVICES")
-    exports._take_gpu(free)
-    assert exports.os.environ.pop("CUDA_VISIBLE_DEVICES") == "0"

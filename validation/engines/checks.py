@@ -40,7 +40,6 @@ rest, let go at once and gone at the first pull; there is no air. What is left o
 the band is slack, and where it becomes taut, is mostly the bending of coarse tetrahedra: it is
 several times too stiff, the more so the closer Poisson's ratio is to 0.5, and finer sections come
 closer to our figures."""
-SAME_MESH = {"edges": 52, "grading": 1.0}  # of PhysX's bands, evenly spaced
 
 
 @dataclass(frozen=True)
@@ -186,7 +185,7 @@ def sling_of(bench: Bench) -> ClampedBand:
 
 
 def damped(thetas: np.ndarray) -> Parameters:
-    """Parameters of thetas (N, 5): MuJoCo and PhysX damp the rate of the nominal stress."""
+    """Parameters of thetas (N, 5): MuJoCo damps the rate of the nominal stress."""
     return Parameters.of(NEO_HOOKEAN, thetas, turn_damping=1.0)
 
 

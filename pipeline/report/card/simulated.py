@@ -48,12 +48,12 @@ class Simulated:
         return smooth(self.place, nodes)
 
 
-def smooth(place: np.ndarray, nodes: np.ndarray, points: int = POINTS) -> np.ndarray:
+def smooth(place: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """A spline through nodes (L, ...) along the band, which goes round the hand without overshoot.
 
-    Shape (points, ...).
+    Shape (POINTS, ...).
     """
-    along = np.linspace(place[0], place[-1], points)
+    along = np.linspace(place[0], place[-1], POINTS)
     return Akima1DInterpolator(place, nodes, axis=0, method="makima")(along)
 
 

@@ -59,12 +59,12 @@ def styles(methods: Iterable[str]) -> Styles:
     return {m: Style(*(KNOWN.get(m) or (m, next(spare)))) for m in methods}
 
 
-def drawn(methods: Iterable[str], count: int = FEW) -> list[str]:
-    """Which methods stand in pictures that can hold only `count`: ours, the paper's, its baselines.
+def drawn(methods: Iterable[str]) -> list[str]:
+    """Which methods stand in pictures that can hold only FEW: ours, the paper's, its baselines.
 
     In the order of `methods`.
     """
     methods = list(methods)
     order = [*DRAWN, *methods]
-    chosen = sorted(methods, key=order.index)[:count]
+    chosen = sorted(methods, key=order.index)[:FEW]
     return [method for method in methods if method in chosen]

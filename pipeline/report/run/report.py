@@ -22,7 +22,7 @@ class Report:
     """All that ran, as it is shown.
 
     Attributes:
-        replays: By band and method; of the methods that are drawn, of all where data are held out.
+        replays: By band and method; of the methods that are drawn.
         styles: By method.
         landscape: Of the first search that refines regions, with its result, where one did.
         root: Of the project, with data/ and reports/.

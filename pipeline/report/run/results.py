@@ -30,8 +30,6 @@ class Floor(FloorOfTarget):
     """The part of what stages/floor.py wrote that is shown."""
 
     launches: int
-    actuation_error_m: float
-    release_jitter: float
     targets: dict[str, FloorOfTarget]
 
 

@@ -76,12 +76,6 @@ def test_a_lens_and_a_pose_are_those_of_opencv() -> None:
     assert np.isnan(pictures.project(behind)).all()
 
 
-def test_the_latest_picture(pictures) -> None:
-    assert pictures.latest(-5.0) == 0
-    for number in (0, 7, len(pictures.time) - 1):
-        assert pictures.latest(pictures.time[number] + 1e-6) == number
-
-
 def test_the_parts_of_a_split_bag_are_one_recording(pictures, summary, project, tmp_path) -> None:
     split(Layout(project).raw(BAND) / "seen.mcap", tmp_path / "seen", cuts=(1.5,))
     parts = Pictures.of(tmp_path / "seen", summary.episode, summary.params.setup)

@@ -77,15 +77,12 @@ def launches() -> pd.DataFrame:
     )  # fmt: skip
 
 
-def confidence(fixed: str | None = None) -> dict:
+def confidence() -> dict:
     """What a θ file says of its confidence; friction cannot be identified."""
     parameters = {
         name: {"low": 0.9 * value, "high": 1.1 * value, "identifiable": name != "dynamic_friction"}
         for name, value in THETA.items()
     }
-    if fixed:
-        parameters[fixed] = {"low": THETA[fixed], "high": THETA[fixed], "identifiable": False}
-        parameters[fixed]["fixed"] = True
     matrix = np.eye(5)
     matrix[0, 1] = matrix[1, 0] = -0.9
     return {

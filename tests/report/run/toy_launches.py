@@ -38,6 +38,4 @@ def floor(mean: float | None = None) -> dict:
         "launches": 60,
         "failed": 0 if mean else 60,
         "targets": {f"{target:g}": of_target for target in TARGETS},
-        "actuation_error_m": 1e-3,
-        "release_jitter": 0.02,
     }

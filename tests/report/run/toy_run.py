@@ -67,8 +67,16 @@ LAUNCHES = {
 RUBBER = dict(zip(LAWS["rubber"], (-0.25, 0.0, 0.2, 0.05, 0.1, 2.0), strict=True))
 
 
-def write_run(root: Path, params: Params) -> Params:
-    """Write the run's files beside those of BAND and METHOD, which are there; its parameters."""
+def run_of(params: Params) -> Params:
+    """Parameters of the run, made of those of BAND and METHOD alone."""
+    bands = dict.fromkeys((*RIG, DIP), with_(params.bands[BAND], "", source="rig"))
+    params = with_(params, "", bands={**bands, BAND: params.bands[BAND]})
+    params = with_(params, "run", bands=(*RIG, BAND), rig=RIG, methods=METHODS, dips=(DIP,))
+    return with_(params, "run.ablations", bands=("band1",), methods=ABLATIONS)
+
+
+def write_run(root: Path) -> None:
+    """Write the run's files beside those of BAND and METHOD, which are there."""
     layout = Layout(root)
     for band, methods in LAUNCHES.items():
         if band != BAND:
@@ -90,10 +98,6 @@ def write_run(root: Path, params: Params) -> Params:
     layout.floor("band1").parent.mkdir()
     for band, mean in (("band1", 0.01), ("band2", None)):
         layout.floor(band).write_text(json.dumps({"band": band} | floor(mean)))
-    bands = dict.fromkeys((*RIG, DIP), with_(params.bands[BAND], "", source="rig"))
-    params = with_(params, "", bands={**bands, BAND: params.bands[BAND]})
-    params = with_(params, "run", bands=(*RIG, BAND), rig=RIG, methods=METHODS, dips=(DIP,))
-    return with_(params, "run.ablations", bands=("band1",), methods=ABLATIONS)
 
 
 def _copy(root: Path, band: str, method: str) -> None:

@@ -8,7 +8,6 @@ import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,11 @@ import numpy as np
 from pipeline.base.errors import UserError
 from pipeline.export.mesh import Tube
 from validation.engines.physx import scene, worker
+from validation.engines.physx.scene import Drive
 
+Steer = Callable[[np.ndarray], np.ndarray | None]
+SPACE = 10.0  # m: a band that leaves it has burst
+BURST = "the band burst in PhysX"
 INTERPRETER = "SLING_PHYSX"  # the Python that has ovphysx; this one by default
 PACKAGES = "'ovphysx>=0.7,<0.8' physx-usd-schemas newton-usd-schemas"  # extra `physx`
 ASK = """
@@ -25,41 +28,6 @@ for name in ("ovstage", "physx-usd-schemas", "newton-usd-schemas", "warp-lang", 
     found = version(name)
 print(found)
 """
-
-
-@dataclass(frozen=True)
-class Drive:
-    """A phase in which some vertices are led along a path; the others are free.
-
-    Attributes:
-        vertices: Those that are led, shape (D,).
-        targets: Where they are at the end of each step [m], shape (S, D, 3) in every band, or
-            (S, N, D, 3), one for each; with (1, ...) for all steps.
-        fade: How much of their distance from targets[0] at the phase's begin is left, shape (S,).
-        keep: Steps after which the nodes' places are kept, shape (S,), bool.
-    """
-
-    vertices: np.ndarray
-    targets: np.ndarray
-    fade: np.ndarray
-    keep: np.ndarray
-
-
-@dataclass(frozen=True)
-class Course:
-    """A simulated phase of N bands.
-
-    Attributes:
-        positions: Of the vertices after the steps kept [m], shape (K, N, sections, V, 3).
-        velocities: At the end [m/s], shape (N, sections, V, 3).
-        seconds: That stepping took, and what was kept to read.
-        attach_seconds: That it took to load the scene for this phase.
-    """
-
-    positions: np.ndarray
-    velocities: np.ndarray
-    seconds: float
-    attach_seconds: float
 
 
 class Engine:
@@ -85,51 +53,23 @@ class Engine:
         self._process.wait()
         self._said.close()
 
-    def simulate(
-        self,
-        tube: Tube,
-        thetas: np.ndarray,
-        phases: list[Drive],
-        *,
-        rate: int,
-        iterations: int,
-        steer: Callable[[np.ndarray], np.ndarray | None] | None = None,
-    ) -> list[Course]:
+    def simulate(self, tube: Tube, thetas: np.ndarray, phases: list[Drive]) -> list[np.ndarray]:
         """Bands of the thetas (N, 5), each from the straight U in which `tube` hangs.
 
-        Args:
-            rate: Steps a second.
-            iterations: Of the solver a step.
-            steer: Goes on with the last phase: from the nodes' places (N, sections, V, 3) [m] to
-                the targets (N, D, 3) at the end of the next step, or None, which ends it.
+        Returns:
+            Of each phase the nodes' places after the steps kept [m], (K, N, sections, V, 3).
         """
-        thetas = np.atleast_2d(np.asarray(thetas, float))
-        job = {
-            "step": 1 / rate,
-            "phases": len(phases),
-            "offsets": scene.offsets(len(thetas)),
-            "rest": tube.rest.reshape(-1, 3),
-            "start": np.tile(tube.hanging.reshape(-1, 3), (len(thetas), 1, 1)),
-        }
-        for i, phase in enumerate(phases):
-            job |= {f"{name}_{i}": value for name, value in vars(phase).items()}
-        shape = (len(thetas), *tube.rest.shape)
-        led = steer and (lambda nodes: steer(nodes.reshape(shape).astype(float)))
-        done = self.run(scene.text(tube, thetas, rate, iterations), job, led)
-        return [
-            Course(
-                done[f"positions_{i}"].reshape(-1, len(thetas), *tube.rest.shape).astype(float),
-                done[f"velocities_{i}"].reshape(-1, *tube.rest.shape).astype(float),
-                float(done[f"seconds_{i}"]),
-                float(done[f"attach_seconds_{i}"]),
-            )
-            for i in range(len(phases))
-        ]
+        start = np.tile(tube.hanging.reshape(-1, 3), (len(thetas), 1, 1))
+        done = self.run(scene.text(tube, thetas), scene.job(tube, start, phases))
+        shape = (-1, len(thetas), *tube.rest.shape)
+        return [done[f"positions_{i}"].reshape(shape).astype(float) for i in range(len(phases))]
 
-    def run(self, text: str, job: dict, steer=None) -> dict[str, np.ndarray]:
-        """What the worker makes of a scene in USD's text form and of a job like `simulate`'s.
+    def run(self, text: str, job: dict, steer: Steer | None = None) -> dict[str, np.ndarray]:
+        """What the worker makes of a scene in USD's text form and of a `scene.job`.
 
-        `steer` is `simulate`'s, but for the nodes' shape (N, sections V, 3).
+        Args:
+            steer: Goes on with the last phase: from the nodes' places (N, nodes, 3) [m] to the
+                targets (N, D, 3) at the end of the next step, or None, which ends it.
         """
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)

@@ -1,119 +1,167 @@
 """Launches in PhysX: the band pushes a projectile that is simulated beside it.
 
-    python -m validation.engines.physx.launches band1 --theta 2.2e5,0.45,3e-3,1,1 [--rate 200]
-
 PhysX cannot free what it leads, so the pouch stays led: where a projectile would go that feels the
 band's force by PhysX's law (law.py) and gravity, with the mass of the held section. A step of the
 projectile follows each step of PhysX (leapfrog), until the band no longer pushes along the launch;
-the projectile then flies as ours does. In both engines alike the arm does not give way. PhysX's
-band feels no air.
+the projectile then flies as ours does. The arm does not give way, and PhysX's band feels no air.
 """
 
 from __future__ import annotations
 
-import argparse
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
-from pipeline.base import errors
-from pipeline.base.errors import UserError
 from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.export.mesh import Tube
-from pipeline.identify.results.mounting import load_sling
-from pipeline.params import Params, load
-from pipeline.simulator.launch import launch
-from pipeline.simulator.model import ClampedBand, LaunchSetup
+from pipeline.export.usd import RATE
+from pipeline.simulator.launch import Launches, outcomes
+from pipeline.simulator.model import GRAVITY, ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import Parameters
+from pipeline.simulator.records import LANE, Outcome
 from pipeline.simulator.rubber import NEO_HOOKEAN
-from validation.engines.checks import SAME_MESH
-from validation.engines.physx.bands import Drive, Engine
-from validation.engines.physx.flight import Flight, Pushed, led_to
-from validation.engines.physx.rollouts import ITERATIONS, RATE
-from validation.engines.physx.study import clamped, hanging
+from validation.engines.physx import scene
+from validation.engines.physx.bands import BURST, SPACE, Engine
+from validation.engines.physx.law import force_on
+from validation.engines.physx.scene import Drive
 
-PULL, REST = 1.5, 1.0  # s: the way to the draw, and at rest there before the release
-FINE = 1000  # steps a second, to see what the paper's 200 do to a launch
-COLUMNS = "draw_y_m", "draw_z_m", "ours_m", "physx_m", "ours_N", "physx_N", "gained"
+HANG, PULL, HOLD = 1.0, 2.0, 1.0  # s
 
 
-def alike(params: Params) -> LaunchSetup:
-    """How both engines launch: the arm does not give way."""
-    return replace(LaunchSetup.of(params.setup, params.sling), arm_stiffness=None)
+class Flight:
+    """Projectiles in their pouches, a step on at each call.
+
+    Called with the nodes (N, sections, V, 3) at rest, and then after each step; returns the
+    targets (N, D, 3) for the next, or None when none is in its pouch any more.
+
+    Args:
+        thetas: The five parameters of each band, shape (N, 5).
+        places: Where the pouches rest (y, z) [m], shape (N, 2).
+    """
+
+    def __init__(
+        self,
+        sling: ClampedBand,
+        setup: LaunchSetup,
+        tube: Tube,
+        thetas: np.ndarray,
+        places: np.ndarray,
+    ) -> None:
+        self.sling, self.setup, self.tube = sling, setup, tube
+        self.start, self.step = np.asarray(places), 1 / RATE
+        self.parameters = Parameters.of(NEO_HOOKEAN, thetas)
+        self.young, self.poisson, damping = np.asarray(thetas, float).T[:3]
+        self.delay, size = damping * RATE, len(places)
+        self.mass = setup.projectile_mass + tube.mass[tube.hand].sum()
+        self.place = np.column_stack([np.zeros(size), self.start])
+        self.direction = -self.place / np.linalg.norm(self.place, axis=1, keepdims=True)
+        self.speed, self.time = np.zeros((size, 3)), 0.0  # half a step behind the place
+        self.before, self.last, self.burst = None, None, np.zeros(size, bool)
+        self.lanes = np.zeros(size, LANE)
+        self.lanes["outcome"], self.lanes["lowest"] = Outcome.GOING_ON, self.place[:, 2]
+
+    @np.errstate(all="ignore")  # burst bands
+    def __call__(self, nodes: np.ndarray) -> np.ndarray | None:
+        """One step. Bands that burst, and those whose projectile has left, are led no further."""
+        sound = (np.abs(nodes) < SPACE).all(axis=(1, 2, 3))  # not a number: neither
+        self.burst |= ~sound & self._going
+        self.lanes["outcome"][~sound & self._going] = Outcome.NOT_CONVERGED
+        nodes = np.where(sound[:, None, None, None], nodes, self.tube.rest)
+        first = self.before is None
+        step = None if first else (self.before, self.delay)
+        force = force_on(self.tube, [self.tube.middle], nodes, self.young, self.poisson, step=step)
+        if first:
+            self.lanes["hold_force"] = self.last = force
+        going = self._going
+        self._part(going & ((force * self.direction).sum(axis=1) <= 0), force)
+        self.lanes["lowest"][going] = np.minimum(self.lanes["lowest"], self.place[:, 2])[going]
+        if self.time >= self.setup.duration or not self._going.any():
+            return None
+        going = self._going[:, None]
+        kick = self.step / 2 if first else self.step
+        pushed = force / self.mass - [0.0, 0.0, GRAVITY]
+        self.speed = self.speed + np.where(going, kick * pushed, 0)
+        self.place = self.place + np.where(going, self.step * self.speed, 0)
+        self.before, self.last, self.time = nodes, force, self.time + self.step
+        return led_to(self.tube, self.place)
+
+    def outcome(self) -> Launches:
+        """What became of them."""
+        done = outcomes(self.sling, self.setup, self.parameters, self.lanes, self.start)
+        failure = np.where(self.burst, BURST, np.array(done.failure, object)).tolist()
+        return replace(done, failure=failure)
+
+    @property
+    def _going(self) -> np.ndarray:
+        return self.lanes["outcome"] == Outcome.GOING_ON
+
+    def _part(self, parts: np.ndarray, force: np.ndarray) -> None:
+        """Store where those that part (N,) left, in the last step, when nothing pushes any more."""
+        pushes = [(vector * self.direction).sum(axis=1) for vector in (self.last, force)]
+        w = (pushes[0] / np.maximum(pushes[0] - pushes[1], 1e-9)).clip(0, 1)[:, None]
+        change = (w - 0.5) * self.last + (w**2 - 0.25) / 2 * (force - self.last)
+        gravity = (w - 0.5) * np.array([0.0, 0.0, GRAVITY])
+        moving = self.step * (self.time > 0)
+        place = self.place - (1 - w) * moving * self.speed
+        speed = self.speed + moving * (change / self.mass - gravity)
+        time = self.time - (1 - w[:, 0]) * moving
+        left = np.column_stack([time, place[:, 1:], speed[:, 1:]])
+        self.lanes["separation"][parts] = left[parts]
+        self.lanes["outcome"][parts] = Outcome.SEPARATED
 
 
-def launch_in_physx(
+def launched(
     engine: Engine,
+    text: str,
+    tube: Tube,
+    thetas: np.ndarray,
     sling: ClampedBand,
     setup: LaunchSetup,
-    thetas: np.ndarray,
-    draws: np.ndarray,
-    *,
-    rate: int = RATE,
-) -> Pushed:
-    """Launch from draws (N, 2) with thetas (N, 5), all at once, in steps of 1 / rate.
+    places: np.ndarray,
+) -> Launches:
+    """Launches from where the hand rests, `places` (N, 2) [m], by a stage of N bands.
 
-    Raises UserError: as `Engine`, or for a law that PhysX does not have.
+    Args:
+        text: The stage: `scene.text`, or of one band an exported stage.
+        thetas: Of its bands, shape (N, 5).
+
+    Raises:
+        UserError: As `Engine.run`.
     """
-    if sling.law != NEO_HOOKEAN:
-        raise UserError(f"PhysX has no law {sling.law}; set law: {NEO_HOOKEAN}")
-    tube = Tube.of(sling, **SAME_MESH)
-    flight, phases = Flight(sling, setup, tube, thetas, draws, rate), course(tube, draws, rate)
-    engine.simulate(tube, thetas, phases, rate=rate, iterations=ITERATIONS, steer=flight)
+    rigid = replace(setup, arm_stiffness=None, history=None)
+    flight = Flight(sling, rigid, tube, thetas, places)
+    flat = tube.clamped.reshape(-1, 3)
+    start, phases = np.tile(flat, (len(places), 1, 1)), drives(tube, places)
+    shape = (len(places), *tube.rest.shape)
+
+    def steer(nodes: np.ndarray) -> np.ndarray | None:
+        return flight(nodes.reshape(shape).astype(float))
+
+    engine.run(text, scene.job(tube, start, phases), steer)
     return flight.outcome()
 
 
-def course(tube: Tube, draws: np.ndarray, rate: int) -> list[Drive]:
-    """Hang; then led straight to each of the draws (N, 2), and at rest there."""
-    hand = np.arange(tube.mass.size).reshape(tube.rest.shape[:2])[tube.middle]
-    times = np.arange(1, round((PULL + REST) * rate) + 1) / rate
-    fade = 1 - minimum_jerk(times / PULL)
-    targets = led_to(tube, np.column_stack([np.zeros(len(draws)), draws]))[None]
-    led = np.concatenate([clamped(tube)[0], hand])
-    return [hanging(tube, rate), Drive(led, targets, fade, np.zeros(len(times), bool))]
+def drives(tube: Tube, places: np.ndarray) -> list[Drive]:
+    """Hang in the clamps; then the middles are led to `places` (N, 2) and held there."""
+    flat = tube.clamped.reshape(-1, 3)
+    hang, pull, hold = (round(time * RATE) for time in (HANG, PULL, HOLD))
+    part = minimum_jerk(np.arange(1, pull + hold + 1) / pull)
+    begin = flat[tube.hand].mean(axis=0)
+    goals = np.column_stack([np.zeros(len(places)), places])
+    path = begin + part[:, None, None] * (goals - begin)
+    led = led_to(tube, path.reshape(-1, 3))
+    return [
+        Drive(tube.ends, flat[tube.ends][None], np.zeros(hang)),
+        Drive(
+            np.concatenate([tube.ends, tube.hand]),
+            led.reshape(*path.shape[:2], -1, 3),
+            1 - part,
+        ),
+    ]
 
 
-def draws_of(setup) -> np.ndarray:
-    """Three draws on the diagonal of the box, shape (3, 2)."""
-    low, high = np.array([setup.draw_y, setup.draw_z]).T
-    return low + np.array([[0.25], [0.5], [0.75]]) * (high - low)
-
-
-def theta_of(text: str) -> np.ndarray:
-    """The five parameters, shape (5,). Raises UserError."""
-    with suppress(ValueError):
-        theta = np.array(text.split(","), float)
-        if theta.shape == (5,) and theta[0] > 0 and 0 < theta[1] < 0.5 and (theta >= 0).all():
-            return theta
-    raise UserError(f"--theta {text}: needs E,nu,d,mu,s, five numbers, nu between 0 and 0.5")
-
-
-def main() -> None:
-    """Print where PhysX and ours land. Raises UserError."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("band")
-    parser.add_argument("--theta", required=True, help="E,nu,d,mu,s")
-    parser.add_argument("--rate", type=int, default=RATE, help="PhysX's steps a second")
-    parser.add_argument("--params", default="params.yaml")
-    requested = parser.parse_args()
-    if requested.rate < 1:
-        raise UserError(f"--rate {requested.rate}: must be a whole number above 0")
-    params = load(requested.params)
-    if requested.band not in params.bands:
-        raise UserError(f"no band {requested.band} in {requested.params}")
-    sling, setup = load_sling(params, requested.band), alike(params)
-    draws = draws_of(params.setup)
-    thetas = np.tile(theta_of(requested.theta), (len(draws), 1))
-    ours = launch(sling, setup, Parameters.of(sling.law, thetas), draws)
-    with Engine() as engine:
-        theirs = launch_in_physx(engine, sling, setup, thetas, draws, rate=requested.rate)
-    print(*(f"{name:>9}" for name in COLUMNS), " PhysX: why not")
-    done = theirs.launches
-    columns = *draws.T, ours.landing_y, done.landing_y, ours.hold_force, done.hold_force
-    for *row, why in zip(*columns, theirs.gained, done.failure, strict=True):
-        print(*(f"{number:9.3f}" for number in row), f" {why or ''}")
-
-
-if __name__ == "__main__":
-    errors.run(main)
+def led_to(tube: Tube, places: np.ndarray) -> np.ndarray:
+    """Targets (N, D, 3) of clamps and pouch, with the pouches at places (N, 3)."""
+    ends = np.tile(tube.clamped.reshape(-1, 3)[tube.ends], (len(places), 1, 1))
+    pouch = places[:, None] + tube.rest[tube.middle] * [0.0, 1.0, 1.0]
+    return np.concatenate([ends, pouch], axis=1)

@@ -14,10 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.export import usd
 from pipeline.export.mesh import Tube
-from pipeline.simulator.model import ClampedBand
-from validation.simulator.closed import String
 
 
 def lame(young, poisson) -> tuple:
@@ -49,15 +46,6 @@ def viscous(before: np.ndarray, gradient: np.ndarray, delay, young, poisson) -> 
     return 2 * mu * delay * ((size - size_before) * along + (volume - volume_before) * cofactor)
 
 
-def energy(tube: Tube, positions: np.ndarray, young, poisson) -> np.ndarray:
-    """Elastic energy of bands at positions (..., sections, V, 3) [J], shape (...)."""
-    mu, lam = (np.asarray(modulus)[..., None] for modulus in lame(young, poisson))
-    before, gradient = gradients(tube, tube.tetrahedra, positions)
-    off, volume, _ = _strain(gradient)
-    density = mu * (off**2).sum(axis=(-2, -1)) + lam / 2 * (volume[..., 0, 0] - 1) ** 2
-    return density @ (np.linalg.det(before) / 6)
-
-
 def force_on(
     tube: Tube, sections: list[int], positions: np.ndarray, young, poisson, *, step=None
 ) -> np.ndarray:
@@ -75,13 +63,13 @@ def force_on(
     held = np.zeros(tube.rest.shape[:2], bool)
     held[sections] = True
     near = tube.tetrahedra[held.ravel()[tube.tetrahedra].any(axis=1)]
-    before, gradient = gradients(tube, near, positions)
+    before, gradient = _gradients(tube, near, positions)
     inverse = np.linalg.inv(before)
     moduli = [np.asarray(modulus)[..., None] for modulus in (young, poisson)]
     nominal = stress(gradient, *moduli)
     if step is not None:
         earlier, delay = step
-        past = gradients(tube, near, earlier)[1]
+        past = _gradients(tube, near, earlier)[1]
         nominal = nominal + viscous(past, gradient, np.asarray(delay)[..., None], *moduli)
     shares = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
     retained = shares * held.ravel()[near][..., None]
@@ -100,7 +88,7 @@ def _strain(gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return gradient - left @ right, np.linalg.det(gradient)[..., None, None], cofactor
 
 
-def gradients(tube: Tube, near: np.ndarray, positions: np.ndarray) -> tuple:
+def _gradients(tube: Tube, near: np.ndarray, positions: np.ndarray) -> tuple:
     """Edges at rest (T, 3, 3) of tetrahedra `near` (T, 4), and their gradients (..., T, 3, 3)."""
     before, now = (
         np.swapaxes(corners[..., 1:, :] - corners[..., :1, :], -1, -2)
@@ -110,22 +98,3 @@ def gradients(tube: Tube, near: np.ndarray, positions: np.ndarray) -> tuple:
         )
     )
     return before, now @ np.linalg.inv(before)
-
-
-def nominal(stretch, young: float, poisson: float) -> np.ndarray:
-    """Pull of a straight string over its area at rest [Pa], free to contract."""
-    return young * usd.nominal(stretch, poisson)
-
-
-def equal_modulus(sling: ClampedBand, theta, stretch) -> np.ndarray:
-    """Factor on Young's modulus with which PhysX's law pulls as ours does at a stretch."""
-    ours = String.of(sling, theta).force(stretch) / sling.area
-    return ours / nominal(stretch, *theta[:2])
-
-
-def energy_left(sling: ClampedBand, theta, stretch: float) -> float:
-    """Energy to a stretch under PhysX's law that pulls there as ours does, over ours, less 1."""
-    to = np.linspace(1, stretch, 1001)
-    theirs = nominal(to, *theta[:2]) * sling.area * equal_modulus(sling, theta, stretch)
-    ours = String.of(sling, theta).force(to)
-    return float(np.trapezoid(theirs, to) / np.trapezoid(ours, to) - 1)

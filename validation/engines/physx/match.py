@@ -33,11 +33,11 @@ from pipeline.export.band import CalibratedBand
 from pipeline.export.match import HOLD, LANDING, LOST, compared, proof_draws
 from pipeline.export.mesh import Tube
 from pipeline.export.replay import Shot
-from pipeline.export.usd import EDGES, GRADING, ITERATIONS, RATE, UsdBand, UsdMatch, near_draws
+from pipeline.export.usd import EDGES, GRADING, UsdBand, UsdMatch, near_draws
 from pipeline.simulator.launch import Launches
 from validation.engines.physx import scene
 from validation.engines.physx.bands import INTERPRETER, Engine, release
-from validation.engines.physx.exported import launched, yielded
+from validation.engines.physx.launches import launched
 
 # Logarithms of modulus, mass and rest length; the clamps' height [m].
 WIDTHS = np.array([0.08, 0.25, 0.03, 0.01])  # to both sides, in the first round
@@ -147,18 +147,11 @@ def _errors(
     engine: Engine, model: CalibratedBand, band: UsdBand, draws, ours: Launches, grid: np.ndarray
 ) -> np.ndarray:
     """Errors of forces and landings, at points (P, 4) of one mesh: (P, 2 N)."""
-    count = len(draws)
-    same = changed(model, band, grid[0])
-    youngs = np.repeat(band.young * np.exp(grid[:, 0]), count)
-    thetas = np.column_stack(
-        [youngs, *(np.full(len(youngs), x) for x in (band.poisson, 0.0, band.friction, 1.0))]
-    )
-    stage = scene.text(same.tube, thetas, RATE, ITERATIONS)
-    shots = launched(
-        engine, stage, same, model.sling, model.launch_setup,
-        np.tile(_places(model, draws, ours), (len(grid), 1)),
-        offsets=scene.offsets(len(youngs)), youngs=youngs,
-    )  # fmt: skip
+    count, same = len(draws), changed(model, band, grid[0])
+    places = np.tile(_places(model, draws, ours), (len(grid), 1))
+    thetas = _thetas(same, np.repeat(band.young * np.exp(grid[:, 0]), count))
+    stage = scene.text(same.tube, thetas)
+    shots = _shots(engine, stage, model, same.tube, thetas, places)
     starts = range(0, len(shots), count)
     return np.array([_relative(shots[start : start + count], ours) for start in starts])
 
@@ -194,13 +187,30 @@ def _launched_singly(
 ) -> list[Shot]:
     """Shots of the written stage, each from draw (N, 2) of its own."""
     places = _places(model, draws, model.launches(draws))
-    stage = usd.text(band)
-    return [
-        launched(engine, stage, band, model.sling, model.launch_setup, place[None])[0]
-        for place in places
-    ]
+    stage, theta = usd.text(band), _thetas(band, np.array([band.young]))
+    return [_shots(engine, stage, model, band.tube, theta, place[None])[0] for place in places]
+
+
+def _shots(engine: Engine, stage: str, model: CalibratedBand, tube: Tube, thetas, places):
+    """Launches of a stage's bands, one by one."""
+    done = launched(engine, stage, tube, thetas, model.sling, model.launch_setup, places)
+    rows = zip(done.landing_y, done.speed, done.angle, done.hold_force, strict=True)
+    return [Shot(*map(float, row)) for row in rows]
+
+
+def _thetas(band: UsdBand, youngs: np.ndarray) -> np.ndarray:
+    """Parameters of bands of Young's moduli (N,) [Pa], shape (N, 5); a stage has no damping."""
+    rest = np.tile([band.poisson, 0.0, band.friction, 1.0], (len(youngs), 1))
+    return np.column_stack([youngs, rest])
 
 
 def _places(model: CalibratedBand, draws: np.ndarray, ours: Launches) -> np.ndarray:
     """Where the hand rests (N, 2): the arm gives way as much as in the calibrated simulation."""
     return yielded(draws, ours.hold_force, model.launch_setup.arm_stiffness)
+
+
+def yielded(draws: np.ndarray, force: np.ndarray, stiffness: float | None) -> np.ndarray:
+    """Where the middle rests (N, 2) when an arm of a stiffness [N/m] is sent to draws (N, 2)."""
+    length = np.linalg.norm(draws, axis=1, keepdims=True)
+    given_way = np.asarray(force)[:, None] / stiffness if stiffness else 0.0
+    return draws * (1 - given_way / length)

@@ -10,21 +10,22 @@ import atexit
 from functools import cache
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from pipeline.base.errors import UserError
+from pipeline.base.minimum_jerk import minimum_jerk
 from pipeline.episode.episode import Episode
 from pipeline.export.mesh import Tube
-from pipeline.simulator.interaction import Rollouts
+from pipeline.export.usd import EDGES, GRADING, RATE
+from pipeline.simulator.interaction import GRASP_BLEND, Rollouts
 from pipeline.simulator.model import GRAVITY, ClampedBand
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
-from validation.engines.checks import SAME_MESH
-from validation.engines.physx.bands import Engine
-from validation.engines.physx.study import MARK, motions, phases
+from validation.engines.physx.bands import BURST, SPACE, Engine
+from validation.engines.physx.law import force_on
+from validation.engines.physx.scene import Drive
 
-RATE, ITERATIONS = MARK, 64  # the paper's steps a second, and the solver's iterations
-SPACE = 10.0  # m: a band that leaves it has burst
-BURST = "the band burst in PhysX"
+SETTLE, LEAD = 1.0, 0.3  # s of hanging before the grasp, of them to lead the ends into the clamps
 
 
 @cache
@@ -44,30 +45,66 @@ def simulate(
     """
     if sling.law != NEO_HOOKEAN:
         raise UserError(f"engine: physx has no law {sling.law}; set law: {NEO_HOOKEAN}")
-    tube, thetas = Tube.of(sling, **SAME_MESH), parameters.theta
-    course = phases(tube, episode, RATE)
-    courses = _engine().simulate(tube, thetas, course, rate=RATE, iterations=ITERATIONS)
-    return rollouts(sling, tube, episode, thetas, courses)
+    tube, thetas = Tube.of(sling, EDGES, GRADING), parameters.theta
+    _, held, free = _engine().simulate(tube, thetas, phases(tube, episode))
+    return rollouts(sling, tube, episode, thetas, held, free)
 
 
-def rollouts(sling, tube: Tube, episode, thetas: np.ndarray, courses) -> Rollouts:
-    """Forces and centre lines of the courses that `study.phases` makes, on the episode's clock.
+def phases(tube: Tube, episode: Episode) -> list[Drive]:
+    """Hang, hold and fly free."""
+    ends = tube.clamped.reshape(-1, 3)[tube.ends]
+    hanging, held, free = (
+        np.arange(1, round(duration * RATE) + 1) / RATE
+        for duration in (
+            SETTLE,
+            episode.release_time - episode.grasp_time,
+            episode.time[-1] - episode.release_time,
+        )
+    )
+    times = episode.release_time - held[-1] + held
+    path = CubicSpline(episode.time, episode.position)(times)
+    led = path[:, None] + tube.rest[tube.middle] * [0.0, 1.0, 1.0]
+    return [
+        Drive(tube.ends, ends[None], 0.5 + 0.5 * np.cos(np.pi * np.minimum(hanging / LEAD, 1))),
+        Drive(
+            np.concatenate([tube.ends, tube.hand]),
+            np.concatenate([np.tile(ends, (len(held), 1, 1)), led], axis=1),
+            1 - minimum_jerk(held / GRASP_BLEND),
+            keep=True,
+        ),
+        Drive(tube.ends, ends[None], np.zeros(len(free)), keep=True),
+    ]
+
+
+def rollouts(
+    sling: ClampedBand,
+    tube: Tube,
+    episode: Episode,
+    thetas: np.ndarray,
+    held: np.ndarray,
+    free: np.ndarray,
+) -> Rollouts:
+    """Forces and centre lines on the episode's clock.
 
     Before the grasp the band hangs and nothing pulls at the hand; after the release, neither.
+
+    Args:
+        held, free: Places of the nodes after each step in the hand and after the release [m],
+            shape (steps, N, sections, V, 3).
     """
     with np.errstate(all="ignore"):  # burst bands
-        bands = motions(tube, thetas, courses)
-    held, free = (len(course.positions) for course in courses[1:])
-    marks = episode.release_time + np.arange(1 - held, free + 1) / RATE
-    times = [episode.grasp_time - 1 / RATE, *marks[:held]]
+        forces = force_on(tube, [tube.middle], held, thetas[:, 0], thetas[:, 1])
+    center_lines = np.concatenate([held, free])[:, :, 1:-1, 0]
+    marks = episode.release_time + np.arange(1 - len(held), len(free) + 1) / RATE
+    times = [episode.grasp_time - 1 / RATE, *marks[: len(held)]]
     times += [episode.release_time + sling.finger_opening_time, marks[-1]]
-    section = tube.mass.reshape(tube.rest.shape[:2])[tube.middle].sum()
+    section = tube.mass[tube.hand].sum()
     force, lines, failure = [], [], []
-    for band in bands:
-        sound = np.isfinite(band.lines).all() and np.abs(band.lines).max() < SPACE
-        pull = (band.force if sound else np.nan * band.force) - [0, 0, section * GRAVITY]
-        force.append(np.concatenate([np.zeros((1, 3)), pull, np.zeros((2, 3))]))
-        lines.append(_at(episode.cloud_time, marks, _between(sling.arc, tube.arc, band.lines)))
+    for pull, line in zip(forces.swapaxes(0, 1), center_lines.swapaxes(0, 1), strict=True):
+        sound = np.isfinite(line).all() and np.abs(line).max() < SPACE
+        on_hand = (pull if sound else np.nan * pull) - [0, 0, section * GRAVITY]
+        force.append(np.concatenate([np.zeros((1, 3)), on_hand, np.zeros((2, 3))]))
+        lines.append(_at(episode.cloud_time, marks, _between(sling.arc, tube.arc, line)))
         failure.append(None if sound else BURST)
     line = np.array(lines, np.float32)
     return Rollouts(np.array(times), np.array(force), episode.cloud_time, line, failure)

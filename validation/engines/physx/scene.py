@@ -1,11 +1,16 @@
-"""Bands as deformable volumes in USD's text form, by the schemas of PhysX and Omni Physics."""
+"""What worker.py reads: bands as deformable volumes in USD's text form, and how they are led.
+
+The stage is by the schemas of PhysX and Omni Physics.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.export.mesh import Tube
-from pipeline.export.usd import surface
+from pipeline.export.usd import ITERATIONS, RATE, surface
 from pipeline.simulator.model import GRAVITY
 
 SPACING = np.array([1.0, 2.5])  # m along x and y from band to band: none reaches the next
@@ -64,28 +69,58 @@ BAND = """
 """
 
 
+@dataclass(frozen=True)
+class Drive:
+    """A phase in which some nodes are led along a path; the others are free.
+
+    Attributes:
+        vertices: Those that are led, shape (D,).
+        targets: Where they are at the end of each step [m], shape (S, D, 3) in every band, or
+            (S, N, D, 3), one for each; with (1, ...) for all steps.
+        fade: How much of their distance from targets[0] at the phase's begin is left, shape (S,).
+        keep: Whether the nodes' places after each step are wanted.
+    """
+
+    vertices: np.ndarray
+    targets: np.ndarray
+    fade: np.ndarray
+    keep: bool = False
+
+
+def job(tube: Tube, start: np.ndarray, phases: list[Drive]) -> dict:
+    """What is done with the N bands of a stage, whose nodes begin at `start` (N, nodes, 3) [m]."""
+    content = {
+        "step": 1 / RATE,
+        "phases": len(phases),
+        "offsets": offsets(len(start)),
+        "rest": tube.rest.reshape(-1, 3),
+        "start": start,
+    }
+    for i, phase in enumerate(phases):
+        content |= {f"{name}_{i}": value for name, value in vars(phase).items()}
+    return content
+
+
 def offsets(count: int) -> np.ndarray:
     """Where each band's origin stands [m], shape (count, 3)."""
     row, column = np.divmod(np.arange(count), COLUMNS)
     return np.stack([column * SPACING[0], row * SPACING[1], 0.0 * row], axis=1)
 
 
-def text(tube: Tube, thetas: np.ndarray, rate: int, iterations: int) -> str:
+def text(tube: Tube, thetas: np.ndarray) -> str:
     """The scene.
 
     Args:
         thetas: The five parameters of each band, shape (N, 5); the damping scale has no slot.
-        rate: Steps a second.
-        iterations: Of the solver a step.
     """
     mesh = {
-        "points": tuples(tube.rest.reshape(-1, 3), ".9g"),
-        "tetrahedra": tuples(tube.tetrahedra, "d"),
-        "faces": tuples(surface(tube.tetrahedra), "d"),
+        "points": _tuples(tube.rest.reshape(-1, 3), ".9g"),
+        "tetrahedra": _tuples(tube.tetrahedra, "d"),
+        "faces": _tuples(surface(tube.tetrahedra), "d"),
         "mass": tube.mass.sum(),
-        "iterations": iterations,
+        "iterations": ITERATIONS,
     }
-    parts = [HEADER % {"gravity": GRAVITY, "rate": rate}]
+    parts = [HEADER % {"gravity": GRAVITY, "rate": RATE}]
     for i, ((young, poisson, damping, friction, _), (x, y, _)) in enumerate(
         zip(thetas, offsets(len(thetas)), strict=True)
     ):
@@ -94,6 +129,6 @@ def text(tube: Tube, thetas: np.ndarray, rate: int, iterations: int) -> str:
     return "".join(parts) + "}\n"
 
 
-def tuples(rows: np.ndarray, form: str) -> str:
+def _tuples(rows: np.ndarray, form: str) -> str:
     """Rows as USD's text form has them."""
     return "[" + ", ".join(f"({', '.join(format(v, form) for v in row)})" for row in rows) + "]"

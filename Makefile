@@ -56,6 +56,6 @@ validate: setup       # slow campaigns, and tests by other engines and readers; 
 	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation tests/app/flow \
 		tests/recording/test_orange.py
 
-clean:                # all but data, checkpoints and DVC's cache
+clean:                # all but data, .checkpoints and DVC's cache
 	rm -rf .venv build *.egg-info .hypothesis .pytest_cache .ruff_cache
 	find . -name __pycache__ -not -path './.dvc/*' -prune -exec rm -rf {} +

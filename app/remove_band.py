@@ -67,8 +67,7 @@ def files_of(layout: Layout, band: str) -> list[Path]:
         *layout.data.glob(f"*/{band}.*"),
         *layout.measured.glob(f"{band}.csv"),
         *layout.card(band).parent.glob(band),
-        *layout.root.glob(f".checkpoints/{band}"),
-        *layout.root.glob(f".checkpoints/{band}-*"),
+        *layout.root.glob(f".checkpoints/{band}-episodes"),
     }
     return sorted(files)
 

@@ -18,7 +18,6 @@ from stages.start import run, started
 
 def main() -> None:
     params, band = started("band")
-    # with the rod, whatever simulates afterwards: a solid mesh has no rigidity to fit
     sling = ClampedBand.of(params.bands[band], params.setup, params.sling)
     clamps = calibrate_clamps(params, sling, load_episode(band), workers=cores())
     write_json(Layout().clamps(band), vars(clamps))

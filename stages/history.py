@@ -4,7 +4,7 @@
 
 By differential evolution for a multistart, by one design for the density, which is fitted from its
 best point. Reads data/episodes/<band>/ and data/clamps/<band>.json; writes
-data/history/<band>/<method>.parquet. Killed, it resumes from .checkpoints/. SLING_DEVICE and
+data/history/<band>/<method>.parquet. Killed, it begins anew. SLING_DEVICE and
 SLING_WORKERS say where it runs.
 """
 

@@ -2,8 +2,8 @@
 
     python -m stages.policy band1 sling2sim2real
 
-Reads data/theta/<band>/<method>.json; writes data/policies/<band>/<method>/: policy.onnx and
-policy.pt (metres to metres), card.json, map.parquet (launches over the box) and training.parquet.
+Reads data/theta/<band>/<method>.json; writes data/policies/<band>/<method>/: policy.onnx (metres
+to metres), card.json, map.parquet (launches over the box) and training.parquet.
 A killed training begins anew: it takes seconds.
 SLING_DEVICE says where launches are simulated; PPO runs on one thread of the CPU.
 """

@@ -5,7 +5,7 @@
 The stages `de`, `bo`, `adam` and `search` of dvc.yaml run it, each for the methods that search so.
 Reads data/episodes/<band>/ and data/clamps/<band>.json; writes everything evaluated to
 data/evaluations/<band>/<method>.parquet, and data/confidence/<band>/<method>.json, which has no
-samples. Killed, it resumes from .checkpoints/. SLING_DEVICE and SLING_WORKERS say where it runs.
+samples. Killed, it begins anew. SLING_DEVICE and SLING_WORKERS say where it runs.
 """
 
 from __future__ import annotations

@@ -85,6 +85,14 @@ def contents(folder: Path) -> dict[Path, bytes]:
     return {file.relative_to(folder): file.read_bytes() for file in files}
 
 
+def texts(*patterns: str) -> list[Path]:
+    """Files that Git has, or would, of names such as *.py; CHANGELOG tells of what is gone."""
+    listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard", *patterns]
+    names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    files = (ROOT / name for name in names.splitlines() if name != "CHANGELOG.md")
+    return [file for file in files if file.is_file()]
+
+
 def until(happens: Callable[[], object], seconds: float = 90.0):
     """What it gives once that is true; the test fails where it is not after so long."""
     result = wait(happens, seconds)

@@ -15,7 +15,7 @@ from ruamel.yaml import YAML
 from app.cli import parser
 from pipeline.report.card.text import GLOSSARY
 from pipeline.report.quantities import QUANTITIES
-from tests.project import DEFAULTS, ROOT, in_use
+from tests.project import DEFAULTS, ROOT, in_use, texts
 from validation.pages import CODE_BLOCK
 
 LINK = re.compile(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)")
@@ -37,16 +37,9 @@ TARGETS = set(re.findall(r"^([a-z][a-z -]*):", (ROOT / "Makefile").read_text(), 
 ELSEWHERE = {"git", "pre-commit"}
 
 
-def pages() -> list[Path]:
-    listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "*.md"]
-    names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    texts = (name for name in names.split() if "/golden/" not in name)
-    return [ROOT / name for name in texts if (ROOT / name).is_file()]
-
-
 def written() -> list[Path]:
     """Pages that people write for users; no stage does."""
-    return [page for page in pages() if "reports" not in page.parts and page.name != "CHANGELOG.md"]
+    return [page for page in texts("*.md", ":!tests") if "reports" not in page.parts]
 
 
 def blocks(language: str, *files: Path) -> list[tuple[Path, str]]:
@@ -82,7 +75,7 @@ def made_by_a_run(path: Path) -> bool:
 
 def test_links_paths_and_anchors_of_every_page_are_there() -> None:
     named, wrong = 0, []
-    for page in pages():
+    for page in texts("*.md", ":!tests"):
         text = page.read_text(encoding="utf-8")
         links = [
             (page.parent / target if target else page, head) for target, head in LINK.findall(text)
@@ -183,21 +176,24 @@ def is_file(name: str) -> bool:
 
 
 def test_every_option_is_one() -> None:
-    """Commands inside sentences: `sling check --sheet`; placeholders may follow."""
+    """Commands in sentences, of messages too: `sling check --sheet`; placeholders may follow."""
     subs = next(
         action for action in parser()._actions if action.choices and "check" in action.choices
     ).choices
     count = 0
-    for page in written():
-        for span in SPAN.findall(page.read_text(encoding="utf-8")):
-            words = span.split()
-            if words[0] != "sling" or len(words) < 2 or words[1].startswith("--"):
-                continue
-            assert words[1] in subs, f"{page.name}: {span}"
-            flags = {word.partition("=")[0].strip("[]") for word in words if word.startswith("--")}
-            assert flags <= set(subs[words[1]]._option_string_actions), f"{page.name}: {span}"
-            count += 1
-    assert count > 20
+    for file in (*written(), *texts("*.j2", "*.py", ":!tests")):
+        text = re.sub(r'"\s*\n\s*f?"', "", file.read_text(encoding="utf-8"))
+        for span in re.findall(r"`((?:sling|make) [^`{}\n]+)`", text):
+            tool, name, *more = span.split()
+            if tool == "make":
+                make([name])
+                count += 1
+            elif name[0].isalpha():
+                assert name in subs, f"{file}: {span}"
+                flags = {word.partition("=")[0].strip("[]") for word in more if word[:2] == "--"}
+                assert flags <= set(subs[name]._option_string_actions), f"{file}: {span}"
+                count += 1
+    assert count > 60
 
 
 def test_python_imports_what_there_is() -> None:

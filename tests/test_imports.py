@@ -13,7 +13,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 from pipeline.base.errors import OF_THE_EXTRA
-from tests.project import ROOT
+from tests.project import ROOT, texts
 
 OURS = {
     "app",
@@ -129,6 +129,30 @@ def test_what_is_imported_is_declared_for_who_imports_it() -> None:
     extras = set().union(*map(declared, PROJECT["optional-dependencies"]))
     idle = (everybody | extras) - used - INDIRECT.keys()
     assert not idle, "declared, and imported by nobody"
+
+
+HINTS = (  # a package that is missing, and the extra that is to bring it
+    r"(\w+) is not installed: [^']*'\.\[(\w+)\]'",
+    r"(\w+), which must be installed \(extra `(\w+)`\)",
+    r"importorskip\(\"(\w+)\"[^)]*'\.\[(\w+)\]'",
+)
+
+
+def test_who_is_told_to_install_an_extra_gets_what_is_missing() -> None:
+    """In messages, docstrings, pages and the reasons of tests that are skipped."""
+    extras, told = PROJECT["optional-dependencies"], []
+    for file in texts("*.py", "*.md", "*.j2"):
+        text = file.read_text("utf-8")
+        text = re.sub(r'"\s*\n\s*f?"', "", text)  # strings that go on in the next line
+        named = re.findall(r"'\.\[(\w+)\]'|extra `(\w+)`", text)
+        unknown = {first or second for first, second in named} - extras.keys()
+        assert not unknown, f"{file}: no extra {unknown}"
+        told += [(file, *hint) for shape in HINTS for hint in re.findall(shape, text)]
+    assert len(told) > 8
+    for file, package, extra in told:
+        candidates = distributions(package.lower())
+        assert candidates & declared(extra), f"{file}: {extra} does not bring {package}"
+        assert not candidates & declared(), f"{file}: everybody has {package}"
 
 
 LIGHT = """

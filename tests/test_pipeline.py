@@ -1,8 +1,11 @@
 """The whole DAG on a tiny budget, in a copy of the project: what runs, and what runs again."""
 
 import json
+import os
 import re
 import shutil
+import signal
+import time
 from collections.abc import Collection, Iterable
 from functools import cached_property
 from pathlib import Path
@@ -14,8 +17,8 @@ from ruamel.yaml import YAML
 
 from app.flow.graph import Stage, leading_to, stages_of
 from rig.physics import compiled
-from tests.project import ROOT
-from validation.projects import TINY, ProjectCopy, copy_project, run_of
+from tests.project import ROOT, contents, until
+from validation.projects import TINY, MarkedRun, ProjectCopy, copy_project, run_of
 
 pytestmark = pytest.mark.slow
 METHODS = ["least_squares", "sling2sim2real"]
@@ -221,18 +224,46 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
         for file in (project.folder / "reports").rglob("*")
         if file.is_file() and file.name != "run.js"  # when and where
     }
-    shutil.rmtree(project.folder / ".checkpoints", ignore_errors=True)
     ran = project.dvc(
         "repro",
         "--force",
         "--no-run-cache",
         "--downstream",
-        "history@band1-sling2sim2real",  # of one phase: tests/identify/objective/test_cache.py
+        "history@band1-sling2sim2real",  # of one phase: tests/identify/search/test_loop.py
     )
     assert ran == {*of_method(PAPER), "report"}
     assert (project.folder / "dvc.lock").read_text() == before
     for file, content in reports.items():
         assert file.read_bytes() == content, file
+
+
+def test_a_run_that_is_killed_goes_on_to_the_same_results(project: Copy) -> None:
+    """All its processes at once, as by a power cut, within three of its stages."""
+    lock, yaml = project.folder / "dvc.lock", YAML()
+    content = yaml.load(lock)
+    before = {name: content["stages"].pop(name) for name in OWN_CHAIN}
+    card = project.folder / "reports/bands" / OWN
+    files = contents(card)
+    yaml.dump(content, lock)
+    shutil.rmtree(project.folder / ".dvc/cache/runs")
+    for entry in before.values():
+        for out in entry["outs"]:
+            path = project.folder / out["path"]
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+    run = MarkedRun(project.folder, **project.environment)
+    for stage in ("density", "policy", "card"):
+        dvc = run.start("dvc", "repro", f"own_card@{OWN}")
+        until(lambda: run.named(f"stages.{stage}") or dvc.poll() is not None)  # noqa: B023
+        time.sleep(0.5)  # it is at work
+        assert dvc.poll() is None, run.message
+        os.killpg(dvc.pid, signal.SIGKILL)
+        dvc.wait()
+        assert run.left() == []
+    assert f"own_card@{OWN}" in project.dvc("repro", f"own_card@{OWN}")
+    stages = yaml.load(lock)["stages"]
+    assert {name: stages[name] for name in OWN_CHAIN} == before
+    assert contents(card) == files
+    assert not [*project.folder.glob("data/**/*.tmp"), *project.folder.glob("reports/**/*.tmp")]
 
 
 class Change(NamedTuple):
@@ -348,7 +379,7 @@ CHANGES = {
     "a chapter of the report": Change(
         ("pipeline/report/run/chapters/appendix.py", "# edited\n"), {"report"}
     ),
-    "a part of the card": Change(("pipeline/report/card/page.py", "# edited\n"), CARDS),
+    "a part of the card": Change(("pipeline/report/card/text.py", "# edited\n"), CARDS),
 }
 
 

@@ -4,8 +4,8 @@
 
 The preset's keys are written into params.yaml, for `git diff` to show and `sling reset` to take
 back (`git checkout reports dvc.lock` for its results); then `sling flow`. Its report is copied to
-reports/presets/. Killed, it goes on where it was, and `seconds` in reports/run.js adds up its
-stretches.
+reports/presets/, and `seconds` in reports/run.js is how long it took. Killed, it goes on where it
+was when it is called again, whose time is then that of the rest.
 """
 
 from __future__ import annotations
@@ -28,17 +28,15 @@ sys.path.insert(0, str(ROOT))
 from app.params_file import edited  # noqa: E402
 from pipeline.base import errors  # noqa: E402
 from pipeline.base.errors import UserError  # noqa: E402
-from pipeline.base.files import replacing_folder, write_json, write_text  # noqa: E402
+from pipeline.base.files import replacing_folder, write_text  # noqa: E402
 from pipeline.params import parse  # noqa: E402
 from pipeline.report.run.run import write_run  # noqa: E402
 
 PRESETS = ROOT / "presets"
-KEPT = Path(".checkpoints", "preset.json")  # "runs" and the "stretches" [s] of a run without an end
 PAGES, PARTS = ("README.md", "appendix.md"), ("figures", "tables", "run.js")
 ELSEWHERE = re.compile(
     rf"(\]\()(?!https?:|#|(?:{'|'.join(map(re.escape, (*PAGES, *PARTS)))})(?=[/#)]))"
 )
-TICK = 10.0  # s, that a kill may lose of its stretch
 
 
 def preset(name: str) -> dict:
@@ -67,32 +65,13 @@ def _merge(content: dict, changes: dict) -> None:
             content[key] = value
 
 
-def timed(
-    run: list[str], root: Path = ROOT, tick: float = TICK, label: str = ""
-) -> tuple[int, list[float]]:
-    """Exit status of a command, and the seconds of its stretches [s], those before a kill first.
-
-    They are kept until it succeeds; another command, or another label, begins anew.
-    """
-    record, runs = root / KEPT, [label, *run]
-    try:
-        content = json.loads(record.read_text(encoding="utf-8"))
-        before = content["stretches"] if content["runs"] == runs else []
-    except (OSError, ValueError, KeyError, TypeError):
-        before = []
-    start, status = time.monotonic(), None
-    process = subprocess.Popen(run, cwd=root)
-    earlier = signal.signal(signal.SIGTERM, lambda *_: process.terminate())
-    while status is None:
-        with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):  # Ctrl-C ends the flow as well
-            status = process.wait(tick)
-        stretches = [*before, round(time.monotonic() - start, 1)]
-        with suppress(UserError):  # a full disk, of which the flow itself will tell
-            write_json(record, {"runs": runs, "stretches": stretches})
-    signal.signal(signal.SIGTERM, earlier)
-    if status == 0:
-        record.unlink(missing_ok=True)
-    return status, stretches
+def status_of(run: list[str]) -> int:
+    """Exit status of a command, which ends by whatever signal ends us."""
+    process = subprocess.Popen(run, cwd=ROOT)
+    signal.signal(signal.SIGTERM, lambda *_: process.terminate())
+    with suppress(KeyboardInterrupt):  # a terminal's Ctrl-C reaches both
+        process.wait()
+    return process.wait()
 
 
 def store_report(reports: Path, name: str) -> Path:
@@ -118,14 +97,10 @@ def main() -> int:
     name, *more = sys.argv[1:]
     run = ["sling", "flow", *more]
     write_preset(ROOT / "params.yaml", preset(name))
-    status, stretches = timed(run, label=name)
+    start = time.monotonic()
+    status = status_of(run)
     if status == 0:
-        took = {
-            "runs": " ".join(run),
-            "preset": name,
-            "seconds": round(sum(stretches)),
-            "stretches": len(stretches),
-        }
+        took = {"runs": " ".join(run), "preset": name, "seconds": round(time.monotonic() - start)}
         print(json.dumps(write_run(ROOT / "reports", **took), indent=2))
         if not more:  # of all stages
             print(f"its report: {store_report(ROOT / 'reports', name).relative_to(ROOT)}/README.md")

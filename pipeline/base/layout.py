@@ -50,19 +50,10 @@ class Layout:
         return self.raw(band) / f"{band}.mcap"
 
     def recordings(self, band: str) -> list[Path]:
-        """All recordings of a band, by name: files, and folders of split bags.
-
-        Raises UserError where they lie as they once did.
-        """
+        """All recordings of a band, by name: files, and folders of split bags."""
         folder = self.raw(band)
         split = {part.parent for part in folder.glob("*/*.mcap*") if part.parent.name[0] != "."}
-        numbered, old = sorted({*folder.glob("*.mcap"), *split}), folder.parent / f"{band}.mcap"
-        if not numbered and old.is_file():
-            raise UserError(
-                f"{old}: the recordings of a band lie in a folder now:"
-                f" mkdir -p {folder} && mv {old} {folder}/"
-            )
-        return numbered
+        return sorted({*folder.glob("*.mcap"), *split})
 
     def episodes(self, band: str) -> Path:
         """Folder of a band's episodes, a folder for each of its recorded pulls."""

@@ -7,9 +7,10 @@ Newton's own springs are linear, and push when they are short; a band does neith
 adds their pull to `State.particle_f`, and SolverSemiImplicit does the rest. At a strain
 e = length / rest length - 1 > 0, with l = 1 + e,
 
-    pull = K/3 (l - l^-2) (1 - m + m/l) + K tau e'
+    pull = K/3 (l - l^-2) (1 - m + m/l + c (l^2 + 2/l - 3)) + K tau e'
 
-and the second term alone where e <= 0.
+and the second term alone where e <= 0. K is `strength_n`, m `mooney_share`, c `upturn` and tau
+`damping_time_s` of the JSON file.
 """
 
 from __future__ import annotations

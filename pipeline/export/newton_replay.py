@@ -88,6 +88,7 @@ def loader() -> ModuleType:
     try:
         from pipeline.export import newton_band
     except ImportError as error:
-        cure = "pip install -e '.[export]' -c constraints.txt"
-        raise UserError(f"newton is not installed: {cure}") from error
+        raise UserError(
+            "newton is not installed: pip install -e '.[export]' -c constraints.txt"
+        ) from error
     return newton_band

@@ -77,16 +77,6 @@ class RunParams(Section):
     own_steps: StepParams
     ablations: Ablations
 
-    @model_validator(mode="before")
-    @classmethod
-    def _own_bands_have_their_list(cls, content: object) -> object:
-        if isinstance(content, dict) and not {"own", "own_steps"} <= content.keys():
-            raise refusal(
-                "lacks `own` and `own_steps`, as the params.yaml of today's version has them: bands"
-                " of your own go from run.bands to run.own"
-            )
-        return content
-
     @model_validator(mode="after")
     def _nothing_runs_twice(self) -> RunParams:
         for method in self.ablations.methods:

@@ -1,15 +1,12 @@
-"""Write a trained policy as ONNX and TorchScript, with a JSON card that says what it is.
+"""Write a trained policy as ONNX, with a JSON card that says what it is.
 
-Both files take targets in metres, shape (batch, 1), and give draws in metres, shape (batch, 2): the
-normalisation is inside. A policy that sees the projectile takes its position (y, z) before the
+The network takes targets in metres, shape (batch, 1), and gives draws in metres, shape (batch, 2):
+the normalisation is inside. A policy that sees the projectile takes its position (y, z) before the
 target. Equal networks give equal bytes, so the cache sees when nothing changed.
 """
 
 from __future__ import annotations
 
-import io
-import warnings
-import zipfile
 from importlib.metadata import version
 from pathlib import Path
 
@@ -35,7 +32,7 @@ USED = ("sling2sim2real", "torch", "rsl-rl-lib", "onnx", "numpy")
 def export(
     trained: Trained, folder: Path, params: Params, band: str, method: str, theta: dict, **more
 ) -> None:
-    """Write a policy's files into `folder`: networks and curve, and last its card.
+    """Write a policy's files into `folder`: network and curve, and last its card.
 
     Args:
         params, band, method, theta, more: As `card` has them.
@@ -43,7 +40,6 @@ def export(
     with replacing(folder / "training.parquet") as temporary:
         pq.write_table(pa.table(trained.curve), temporary)
     write_onnx(trained.policy, folder / "policy.onnx")
-    write_torchscript(trained.policy, folder / "policy.pt")
     content = card(trained.policy, params, band, method, theta, **more)
     write_json(folder / "card.json", content)
 
@@ -104,21 +100,6 @@ def write_onnx(policy: Policy, path: Path) -> None:
     onnx.checker.check_model(model)
     with replacing(path) as temporary:
         temporary.write_bytes(model.SerializeToString(deterministic=True))
-
-
-def write_torchscript(policy: Policy, path: Path) -> None:
-    """Write the policy as TorchScript, less its debug records, which hold this machine's paths."""
-    saved, retained = io.BytesIO(), io.BytesIO()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # torch would rather have torch.export
-        # Frozen: a plain script lists attributes in the order of a set, which changes by run.
-        torch.jit.save(torch.jit.freeze(torch.jit.script(policy.eval())), saved)
-    with zipfile.ZipFile(saved) as source, zipfile.ZipFile(retained, "w") as target:
-        for entry in source.infolist():
-            if not entry.filename.endswith((".debug_pkl", "/serialization_id")):
-                target.writestr(zipfile.ZipInfo(entry.filename), source.read(entry))
-    with replacing(path) as temporary:
-        temporary.write_bytes(retained.getvalue())
 
 
 def card(

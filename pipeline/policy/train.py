@@ -13,7 +13,7 @@ import io
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
@@ -34,11 +34,10 @@ CHECKED_TARGETS = 256
 class Policy(nn.Module):
     """Target in metres to draw in metres; the normalisation of both is part of it."""
 
-    if TYPE_CHECKING:  # TorchScript would read them
-        target_center: torch.Tensor
-        target_half: torch.Tensor
-        draw_center: torch.Tensor
-        draw_half: torch.Tensor
+    target_center: torch.Tensor
+    target_half: torch.Tensor
+    draw_center: torch.Tensor
+    draw_half: torch.Tensor
 
     def __init__(
         self, network: nn.Sequential, targets: tuple[float, float], surface: Source
@@ -66,8 +65,7 @@ class Policy(nn.Module):
 class ProjectilePolicy(Policy):
     """The same for a state as the paper prints it: where the projectile is, and the target."""
 
-    if TYPE_CHECKING:
-        projectile: torch.Tensor
+    projectile: torch.Tensor
 
     def __init__(
         self,

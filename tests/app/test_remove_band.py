@@ -38,8 +38,7 @@ def put(root: Path, band: str) -> list[Path]:
         layout.measured / f"{band}.csv",
         layout.plans(band) / "trajectory.csv",
         layout.card(band) / "card.json",
-        root / ".checkpoints" / band / "cache",
-        root / ".checkpoints" / f"{band}-unmounted" / "cache",
+        root / ".checkpoints" / f"{band}-episodes" / "kept",
     ]
     for file in files:
         file.parent.mkdir(parents=True, exist_ok=True)

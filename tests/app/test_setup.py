@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
@@ -30,7 +30,6 @@ def path(tmp_path: Path) -> Path:
     return file
 
 
-@settings(deadline=None, max_examples=150)
 @given(
     st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1), st.floats(0.05, 1), st.floats(-3.1, 3.1)
 )

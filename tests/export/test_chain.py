@@ -1,13 +1,17 @@
 """The chain: its springs, its time step, its shapes."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from pipeline.base.code import ROOT
 from pipeline.base.errors import UserError
 from pipeline.export.chain import STEPS, SpringChain
 from sling2sim2real import Band, Model, Theta
+
+PLAIN = str.maketrans({"λ": "l", "−": "-", "⁻": "^-", "²": "^2"})
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +42,17 @@ def test_two_cubic_springs_pull_as_the_law(chain, share, upturn) -> None:
     summary = chain.cubic_springs()[3]
     assert np.abs(error).max() <= summary * (1 + 1e-9) and summary < 0.006  # both sums round
     assert (pulled_by_two(chain, np.array([-0.5, 0.0])) == 0).all()  # it never pushes
+
+
+@pytest.mark.parametrize("file", ["chain.py", "newton_band.py", "chain.md.j2"])
+def test_each_text_has_the_law_that_is_computed(chain, file: str) -> None:
+    chain = replace(chain, mooney_share=0.3, upturn=0.2)
+    text = (ROOT / "pipeline/export" / file).read_text("utf-8").translate(PLAIN)
+    law = re.search(r"K/3 \(l.*?\)(?=;| \+ K tau)", text)[0].replace("^-^", "^-").replace("^", "**")
+    law = re.sub(r"(?<=[\w)]) ?\(", " * (", law)  # what stands side by side is multiplied
+    stretch = np.linspace(1.1, 2.0, 5)
+    names = {"l": stretch, "K": chain.strength, "m": chain.mooney_share, "c": chain.upturn}
+    assert eval(law, names) == pytest.approx(chain.pull(stretch - 1), rel=1e-12)
 
 
 def test_the_first_guess_is_the_law_of_a_stretched_string() -> None:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -13,8 +14,6 @@ from pipeline.export.mujoco_replay import MujocoBand
 from sling2sim2real import UserError, export
 from tests.export import replayed
 from tests.export.replayed import DRAW
-
-mujoco = pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[validation]'")
 
 
 @pytest.fixture(scope="module")

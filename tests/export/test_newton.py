@@ -17,7 +17,6 @@ from tests.export import replayed
 from tests.export.replayed import DRAW
 
 pytest.importorskip("newton", reason="newton: pip install -e '.[export]'")
-pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[export]'")
 
 
 @pytest.fixture(scope="module")

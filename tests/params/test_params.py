@@ -234,8 +234,7 @@ def test_bands_of_ones_own_are_recorded_and_have_a_list() -> None:
     content["run"]["own"], content["run"]["dips"] = [], ["band3"]
     assert "run.dips: band3 has source: recording: put it under run.own" in refusal(content)
     del content["run"]["own"]
-    assert "run: lacks `own` and `own_steps`" in refusal(content)
-    assert "from run.bands to run.own" in refusal(content)
+    assert "run.own: is missing" in refusal(content)
 
 
 def test_what_a_method_leaves_out_is_as_the_defaults_say() -> None:

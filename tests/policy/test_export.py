@@ -15,7 +15,7 @@ from pipeline.base.files import write_json
 from pipeline.launching.surface.stored import Stored
 from pipeline.params import load
 from pipeline.policy.check import PolicyCheck, figures
-from pipeline.policy.export import card, write_onnx, write_torchscript
+from pipeline.policy.export import card, write_onnx
 from pipeline.simulator.parameters import THETA
 from tests.policy import toy
 from tests.policy.card_schema import SCHEMA
@@ -28,7 +28,6 @@ TARGETS = np.random.default_rng(0).uniform(1.425, 2.425, (1000, 1)).astype(np.fl
 def stored(trained, tmp_path_factory):
     stored = Stored("toy", "none", tmp_path_factory.mktemp("root"))
     write_onnx(trained.policy, stored.folder / "policy.onnx")
-    write_torchscript(trained.policy, stored.folder / "policy.pt")
     return stored
 
 
@@ -45,21 +44,18 @@ def apart(code: str, folder: Path, **environment: str) -> str:
 
 
 def answers(policy, folder: Path, **given: np.ndarray) -> np.ndarray:
-    """What the ONNX file answers to its inputs, as TorchScript and the network do to 1e-5 m."""
-    tensors = [torch.from_numpy(array) for array in given.values()]
+    """What the ONNX file answers to its inputs, as the network does to 1e-5 m."""
     with torch.inference_mode():
-        network = policy(*tensors).numpy()
-        script = torch.jit.load(folder / "policy.pt")(*tensors).numpy()
+        network = policy(*map(torch.from_numpy, given.values())).numpy()
     session = onnxruntime.InferenceSession(folder / "policy.onnx")
     assert [port.name for port in session.get_inputs()] == list(given)
     graph = session.run(["draw"], given)[0]
-    assert network.shape == script.shape == graph.shape == (1000, 2)
-    np.testing.assert_allclose(script, network, rtol=0, atol=1e-5)
+    assert network.shape == graph.shape == (1000, 2)
     np.testing.assert_allclose(graph, network, rtol=0, atol=1e-5)
     return graph
 
 
-def test_onnx_and_torchscript_agree_with_the_network(trained, stored, folder) -> None:
+def test_onnx_agrees_with_the_network(trained, stored, folder) -> None:
     """On 1,000 targets to 1e-5 m; and it is a network that has learned to hit."""
     graph = answers(trained.policy, folder, target=TARGETS)
     np.testing.assert_array_equal(stored.draws(TARGETS[:, 0]), graph.astype(float))
@@ -71,7 +67,6 @@ def test_a_policy_that_sees_the_projectile_agrees_too(seeing, tmp_path) -> None:
     """With positions other than the one it was trained at: the input is one."""
     stored = Stored("toy", "seeing", tmp_path)
     write_onnx(seeing.policy, stored.folder / "policy.onnx")
-    write_torchscript(seeing.policy, stored.folder / "policy.pt")
     write_json(stored.folder / "card.json", written(seeing, FIGURES))
     onnx.checker.check_model(onnx.load(stored.folder / "policy.onnx"), full_check=True)
     random = np.random.default_rng(1)
@@ -82,33 +77,11 @@ def test_a_policy_that_sees_the_projectile_agrees_too(seeing, tmp_path) -> None:
     assert np.abs(draws - graph).max() > 1e-3  # so the position counts
 
 
-def test_one_file_each_without_paths(folder) -> None:
-    assert sorted(file.name for file in folder.iterdir()) == ["policy.onnx", "policy.pt"]
-    onnx.checker.check_model(onnx.load(folder / "policy.onnx"), full_check=True)
-    for file in folder.iterdir():
-        for path in (b"site-packages", os.fsencode(ROOT)):
-            assert path not in file.read_bytes()
-
-
-def test_the_files_need_nothing_of_ours(stored, folder, tmp_path) -> None:
-    """Copied elsewhere: ONNX with onnxruntime alone, TorchScript with torch alone."""
-    for name in ("policy.onnx", "policy.pt"):
-        (tmp_path / name).write_bytes((folder / name).read_bytes())
-    expected = stored.draws(np.array([1.9, 2.1]))
-    by_onnx = """
-import sys, numpy, onnxruntime
-session = onnxruntime.InferenceSession("policy.onnx")
-print(session.run(None, {"target": numpy.array([[1.9], [2.1]], numpy.float32)})[0].tolist())
-assert not {"torch", "onnx", "pipeline", "rsl_rl"} & set(sys.modules)
-"""
-    by_torch = """
-import sys, torch
-print(torch.jit.load("policy.pt")(torch.tensor([[1.9], [2.1]])).tolist())
-assert not {"pipeline", "rsl_rl"} & set(sys.modules)
-"""
-    for code in (by_onnx, by_torch):
-        draws = json.loads(apart(code, tmp_path))
-        np.testing.assert_allclose(draws, expected, rtol=0, atol=1e-5)
+def test_one_file_without_paths(folder) -> None:
+    (file,) = folder.iterdir()
+    onnx.checker.check_model(onnx.load(file), full_check=True)
+    for path in (b"site-packages", os.fsencode(ROOT)):
+        assert path not in file.read_bytes()
 
 
 def test_the_example_asks_a_policy_where_this_project_is_not(trained, stored, tmp_path) -> None:
@@ -135,22 +108,19 @@ runpy.run_path("policy_elsewhere.py", run_name="__main__")
 
 
 def test_equal_networks_give_equal_bytes(trained, folder, tmp_path) -> None:
-    """In another process, whose sets are in another order; torch numbers what one has scripted."""
+    """In other processes, whose sets are in another order."""
     torch.save(trained.policy, tmp_path / "network.pickle")
     code = """
 import torch
 from pathlib import Path
-from pipeline.policy.export import write_onnx, write_torchscript
-policy = torch.load("../network.pickle", weights_only=False)
-write_onnx(policy, Path("policy.onnx"))
-write_torchscript(policy, Path("policy.pt"))
+from pipeline.policy.export import write_onnx
+write_onnx(torch.load("../network.pickle", weights_only=False), Path("policy.onnx"))
 """
     for seed in "12":
         (tmp_path / seed).mkdir()
         apart(code, tmp_path / seed, PYTHONHASHSEED=seed, PYTHONPATH=str(ROOT))
-    for name in ("policy.onnx", "policy.pt"):
-        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
-    assert (tmp_path / "1/policy.onnx").read_bytes() == (folder / "policy.onnx").read_bytes()
+        other = (tmp_path / seed / "policy.onnx").read_bytes()
+        assert other == (folder / "policy.onnx").read_bytes()
 
 
 FIGURES = {

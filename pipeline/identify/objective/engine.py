@@ -7,9 +7,7 @@ the rollouts (interaction.py) stay on the host. It runs on one device, whichever
 
 from __future__ import annotations
 
-import inspect
 from importlib.metadata import entry_points
-from pathlib import Path
 from typing import cast
 
 from pipeline.base.errors import UserError, one_line
@@ -42,13 +40,3 @@ def _installed(engine: str) -> str:
     for entry in entry_points(group=GROUP, name=engine):
         return entry.value
     raise LookupError(f"no installed package has it among its {GROUP}; install this one anew")
-
-
-def sources_of(engine: str) -> list[Path]:
-    """The folder of another engine's code, which its rollouts depend on; none for ours."""
-    if engine == OUR_ENGINE:
-        return []
-    source = inspect.getsourcefile(simulate_of(engine))
-    if source is None:
-        raise UserError(f"engine {engine}: must be a function of Python, in a file of its own")
-    return [Path(source).parent]

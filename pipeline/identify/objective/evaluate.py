@@ -18,7 +18,6 @@ from pipeline.identify.objective.loss import TERMS, EpisodeLoss
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.model import ClampedBand
 
-NOT_FINITE = "the loss is not finite"  # the one failure that depends on the weights
 SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
 
 Simulate = Callable[..., Rollouts]
@@ -34,7 +33,6 @@ class Evaluation:
         terms: Each loss term, shape (N,); NaN where the rollout failed.
         total: Weighted sum of the terms, shape (N,); +inf where the rollout failed.
         failure: None or the reason, length N.
-        seconds: What it took.
     """
 
     unit: np.ndarray
@@ -42,7 +40,6 @@ class Evaluation:
     terms: dict[str, np.ndarray]
     total: np.ndarray
     failure: list[str | None]
-    seconds: float = 0.0
 
 
 class Evaluator:
@@ -94,8 +91,16 @@ class Evaluator:
         parts = [part for each in begun for part in each]
         terms = {name: np.concatenate([part[0][name] for part in parts]) for name in TERMS}
         failure = [reason for part in parts for reason in part[1]]
-        seconds = time.perf_counter() - start
-        return weighed(self.loss, unit, theta, terms, failure, seconds)
+        with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
+            total = self.loss.total(terms)
+        failure = [
+            reason or (None if finite else "the loss is not finite")
+            for reason, finite in zip(failure, np.isfinite(total), strict=True)
+        ]
+        failed = np.array([reason is not None for reason in failure])
+        terms = {name: np.where(failed, np.nan, values) for name, values in terms.items()}
+        total = np.where(failed, np.inf, total)
+        return Evaluation(unit, theta, terms, total, failure, time.perf_counter() - start)
 
     def _slices(self, theta: np.ndarray) -> Iterator[np.ndarray]:
         return (theta[i : i + self._slice] for i in range(0, len(theta), self._slice))
@@ -107,27 +112,6 @@ class Evaluator:
         rollouts = self._simulate(self._band, parameters=parameters, device=device)
         with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
             return self.loss.terms(rollouts), rollouts.failure
-
-
-def weighed(
-    loss: EpisodeLoss,
-    unit: np.ndarray,
-    theta: np.ndarray,
-    terms: dict[str, np.ndarray],
-    failure: list[str | None],
-    seconds: float = 0.0,
-) -> Evaluation:
-    """The evaluation of points (N, D) whose terms are known; a loss not finite is a failure."""
-    with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
-        total = loss.total(terms)
-    failure = [
-        reason or (None if finite else NOT_FINITE)
-        for reason, finite in zip(failure, np.isfinite(total), strict=True)
-    ]
-    failed = np.array([reason is not None for reason in failure])
-    terms = {name: np.where(failed, np.nan, values) for name, values in terms.items()}
-    total = np.where(failed, np.inf, total)
-    return Evaluation(unit, theta, terms, total, failure, seconds)
 
 
 class Penalty:

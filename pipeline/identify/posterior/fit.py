@@ -18,7 +18,7 @@ from scipy.optimize import lsq_linear
 from pipeline.base.errors import UserError
 from pipeline.identify.posterior.coordinates import Coordinates
 from pipeline.identify.posterior.expansion import Expansion
-from pipeline.identify.posterior.launches import LaunchLikelihood
+from pipeline.identify.posterior.launches import LaunchExpansion, LaunchLikelihood
 from pipeline.identify.posterior.likelihood import Failed, Likelihood
 
 ITERATIONS = 60  # at most
@@ -47,6 +47,7 @@ class Fit:
         hessian, gradient: Of -log p there, and of log p: 0 but at bounds; (D, D), (D,).
         nuisances: Of each recording, shape (N, 3).
         expansions: Of each recording there.
+        launches: Their expansion there; None without.
         misfit: -2 log p there, priors included.
         steps: How many expansions it took.
         settled: Whether the next step would be small, hardly damped.
@@ -57,6 +58,7 @@ class Fit:
     gradient: np.ndarray
     nuisances: np.ndarray
     expansions: list[Expansion]
+    launches: LaunchExpansion | None
     misfit: float
     steps: int
     settled: bool
@@ -72,6 +74,9 @@ def fit(
     progress: Callable[[Fit], None] = lambda fit: None,
 ) -> Fit:
     """Fit coordinates from `start` (D,). Raises NoFit.
+
+    A step into the failure of a recording's simulation, or of a launch that landed, is none. A
+    launch that fails from the start counts as soon as a step makes it land.
 
     Args:
         launches: That are evidence too.
@@ -102,9 +107,11 @@ def fit(
                     ) from None
                 trial = None
             else:
-                seen = launches and launches.expand(*around)
-                trial = _density(coordinates, phi, nuisances, expansions, seen, steps)
-            if trial and (best is None or trial.misfit < best.misfit or sort):
+                launched = launches.expand(*around) if launches else None
+                trial = _density(coordinates, phi, nuisances, expansions, launched, steps)
+            if best and trial and _fails_more(trial, best):
+                trial = None
+            if trial and (best is None or _nearer(trial, best) or sort):
                 best, damp = trial, damp * EASIER
                 progress(best)
             else:
@@ -132,6 +139,17 @@ def fit(
     return replace(best, steps=ITERATIONS)
 
 
+def _fails_more(trial: Fit, best: Fit) -> bool:
+    """Whether a launch fails that did not."""
+    now, before = trial.launches, best.launches
+    return bool(now and before and (now.failed & ~before.failed).any())
+
+
+def _nearer(trial: Fit, best: Fit) -> bool:
+    """Whether the misfit is less, or a launch lands now: what failed had no misfit to compare."""
+    return trial.misfit < best.misfit or _fails_more(best, trial)
+
+
 def _size(fit: Fit, step: np.ndarray) -> float:
     """Length of a step (D,), in standard deviations along it: Mahalanobis's distance."""
     return float(np.sqrt(step @ fit.hessian @ step))
@@ -148,18 +166,24 @@ def _density(
     phi: np.ndarray,
     nuisances: np.ndarray,
     expansions: list[Expansion],
-    launches: tuple[float, np.ndarray, np.ndarray] | None,
+    launches: LaunchExpansion | None,
     steps: int,
 ) -> Fit:
     prior, gap = coordinates.precision, phi - coordinates.expected
-    misfit, hessian, gradient = launches or (0.0, 0.0, 0.0)
+    hessian = sum(expansion.hessian for expansion in expansions) + np.diag(prior)
+    gradient = sum(expansion.gradient for expansion in expansions) - prior * gap
+    misfit = sum(expansion.misfit for expansion in expansions) + float(prior @ gap**2)
+    if launches:
+        hessian, gradient = hessian + launches.hessian, gradient + launches.gradient
+        misfit += launches.misfit
     return Fit(
         phi=phi,
-        hessian=sum(expansion.hessian for expansion in expansions) + np.diag(prior) + hessian,
-        gradient=sum(expansion.gradient for expansion in expansions) - prior * gap + gradient,
+        hessian=hessian,
+        gradient=gradient,
         nuisances=nuisances,
         expansions=expansions,
-        misfit=sum(expansion.misfit for expansion in expansions) + float(prior @ gap**2) + misfit,
+        launches=launches,
+        misfit=misfit,
         steps=steps,
         settled=False,
     )

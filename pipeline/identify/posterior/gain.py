@@ -43,6 +43,7 @@ class LandingModel:
         cls,
         names: Sequence[str],
         samples: np.ndarray,
+        chosen: np.ndarray,
         landings: np.ndarray,
         draw: np.ndarray,
         half_width: np.ndarray,
@@ -53,6 +54,7 @@ class LandingModel:
 
         Args:
             names: Of the columns of `samples`.
+            chosen: Numbers of the samples that landed there, shape (S,).
             draw, half_width: As the attributes.
         """
         good = np.isfinite(landings).all(axis=0)
@@ -60,7 +62,7 @@ class LandingModel:
         if not unknown or not np.isfinite(half_width).all() or good.sum() < 2 * len(unknown):
             return None
         columns = np.stack(list(unknown.values()), axis=1)
-        some = np.linspace(0, len(samples) - 1, landings.shape[1]).astype(int)[good]
+        some = chosen[good]
         design = np.column_stack([np.ones(len(some)), columns[some] - columns.mean(axis=0)])
         gradient = np.linalg.lstsq(design, landings[:, good].T, rcond=None)[0][1:].T
         covariance = np.atleast_2d(np.cov(columns.T))

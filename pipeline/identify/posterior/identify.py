@@ -106,7 +106,7 @@ def fit_posterior(
     launches = None
     if evidence and evidence.launches:
         setup = replace(evidence.setup, history=recorded_history(sling, episodes))
-        launches = LaunchLikelihood(evidence.launches, sling, setup)
+        launches = LaunchLikelihood(evidence.launches, sling, setup, workers or cores())
     options = {"launches": launches, "workers": workers, "progress": progress}
     begin = coordinates.of(start)
     nearest = coordinates.parameters(begin[None])
@@ -204,12 +204,14 @@ def confidence(identified: Identified) -> dict:
         for name in (*EXTRA, product)
     }
     derived |= _clocks(identified)
-    matrix = np.corrcoef(identified.samples.T + 1e-12 * np.arange(SAMPLES))
     return {
         "level": LEVEL,
         "parameters": parameters,
         "derived": derived,
-        "correlation": {"names": list(identified.coordinates.names), "matrix": matrix.tolist()},
+        "correlation": {
+            "names": list(identified.coordinates.names),
+            "matrix": correlation(identified.samples).tolist(),
+        },
         "recordings": [_left(identified, number) for number in range(len(identified.recordings))],
         "disagreement": identified.birge,
         "launches": _launched(identified),
@@ -240,6 +242,14 @@ def _priors(identified: Identified) -> dict[str, dict]:
         summary = bool(widths[axis] < FILLS * np.ptp(ends[:, axis]))
         result[name] = {"prior": values.tolist(), "identifiable": summary}
     return result
+
+
+def correlation(samples: np.ndarray) -> np.ndarray:
+    """Correlations of D columns of samples (M, D), shape (D, D); one that is constant has none."""
+    varies = np.ptp(samples, axis=0) > 0
+    matrix = np.eye(len(varies))
+    matrix[np.ix_(varies, varies)] = np.corrcoef(samples[:, varies].T)
+    return matrix
 
 
 def interval(samples: np.ndarray, mode: float) -> tuple[float, float]:
@@ -308,13 +318,13 @@ def leave_one_out(identified: Identified, number: int) -> dict:
 
 
 def _launched(identified: Identified) -> list[dict]:
-    launches = identified.launches
-    if launches is None:
+    launches, expansion = identified.launches, identified.fit.launches
+    if launches is None or expansion is None:
         return []
     unlikely = without_each(
-        launches, identified.fit.hessian, identified.fit.gradient, identified.birge
+        expansion, identified.fit.hessian, identified.fit.gradient, identified.birge
     )
-    parts = launches.draws, launches.landings, launches.left, unlikely
+    parts = launches.draws, launches.landings, expansion.left, unlikely
     return [
         {
             "draw": draw.tolist(),

@@ -54,6 +54,49 @@ class Evidence:
     made_with: Mapping[str, float | None] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class LaunchExpansion:
+    """-2 log p of N launches around coordinates (D,).
+
+    Attributes:
+        left: Of each, log of measured over simulated landing; NaN where the simulated launch
+            fails, or one from a draw beside it, shape (N,).
+        spread: Standard deviation of that logarithm, shape (N,).
+        design: Change of `left` with the coordinates, over the spread, shape (D, N); 0 where a
+            launch fails, and in a coordinate whose finite difference fails.
+    """
+
+    left: np.ndarray
+    spread: np.ndarray
+    design: np.ndarray
+
+    @property
+    def failed(self) -> np.ndarray:
+        """Which launches fail, shape (N,); they count in nothing else here."""
+        return np.isnan(self.left)
+
+    @property
+    def gap(self) -> np.ndarray:
+        """`left` over the spread, shape (N,)."""
+        return self.left / self.spread
+
+    @property
+    def misfit(self) -> float:
+        gap = self.gap[~self.failed]
+        return float(gap @ gap)
+
+    @property
+    def hessian(self) -> np.ndarray:
+        """As of an `Expansion`, shape (D, D)."""
+        design = self.design[:, ~self.failed]
+        return design @ design.T
+
+    @property
+    def gradient(self) -> np.ndarray:
+        """As of an `Expansion`, shape (D,)."""
+        return self.design[:, ~self.failed] @ self.gap[~self.failed]
+
+
 class LaunchLikelihood:
     """Launches of one band.
 
@@ -62,31 +105,28 @@ class LaunchLikelihood:
         deepest: What the band had seen before each launch [m], of a law with memory, shape (N,): as
             the history says, or an earlier launch. Rubber softens up to its largest stretch.
         after: The same after all of them.
-        left: Of each, log of measured over simulated landing at the last expansion; NaN where the
-            simulated launch fails, which then counts for nothing.
-        spread: Standard deviation of each, of that logarithm.
-        gap, design: Of each, `left` and its change with the D coordinates, shape (D, N), both over
-            the spread.
     """
 
     def __init__(
-        self, observed: Sequence[Observed], sling: ClampedBand, setup: LaunchSetup
+        self,
+        observed: Sequence[Observed],
+        sling: ClampedBand,
+        setup: LaunchSetup,
+        workers: int = 1,
     ) -> None:
-        self.sling, self.setup = sling, setup
+        """Keep the launches; `workers` are threads, which change no result."""
+        self.sling, self.setup, self.workers = sling, setup, workers
         self.draws = np.array([launched.draw for launched in observed], float).reshape(-1, 2)
         self.errors = np.array([launched.error for launched in observed], float)
         self.landings = np.array([launched.landing for launched in observed], float)
         first = setup.history.deepest if setup.history else 0.0
         seen = np.maximum.accumulate(np.append(first, np.linalg.norm(self.draws, axis=1)))
         self.deepest, self.after = seen[:-1], float(seen[-1])
-        self.left = np.full(len(self.draws), np.nan)
-        self.spread = self.gap = self.left
-        self.design = np.zeros((0, len(self.draws)))
 
     def expand(
         self, parameters_of: Callable[[np.ndarray], Parameters], phi: np.ndarray, steps: np.ndarray
-    ) -> tuple[float, np.ndarray, np.ndarray]:
-        """Misfit, Hessian (D, D) and gradient (D,) at coordinates (D,), as of an `Expansion`."""
+    ) -> LaunchExpansion:
+        """Expand around coordinates (D,) with finite differences `steps` (D,)."""
         around = parameters_of(phi + np.vstack([0 * steps, np.diag(steps)]))
         number = np.arange(len(self.draws))
         here, gradient = landing_gradient(
@@ -102,25 +142,25 @@ class LaunchLikelihood:
             np.tile(self.draws, (count, 1)),
             np.tile(number, count),
         ).reshape(count, -1)
-        self.left = np.log(self.landings / here)
+        left = np.log(self.landings / here)
         changes = (np.log(moved) - np.log(here)) / steps[:, None]  # (D, N)
-        self.spread = np.hypot(slope * self.errors / here, TAPE / self.landings)
-        self.gap, self.design = self.left / self.spread, changes / self.spread
-        good = np.isfinite(self.gap + self.design.sum(axis=0))
-        gap, design = self.gap[good], self.design[:, good]
-        return float(gap @ gap), design @ design.T, design @ gap
+        spread = np.hypot(slope * self.errors / here, TAPE / self.landings)
+        design = changes / spread
+        left[~np.isfinite(left / spread)] = np.nan
+        design[~np.isfinite(design)] = 0.0
+        return LaunchExpansion(left, spread, design)
 
-    def remaining(self, parameters: Parameters) -> np.ndarray:
+    def remaining(self, parameters: Parameters, expansion: LaunchExpansion) -> np.ndarray:
         """Logs of measured over simulated landings of M parameters, over the spread: (M, N).
 
-        NaN where a simulation fails; of the launches that do not fail at the last expansion.
+        NaN where a simulation fails; of the launches that do not fail at the expansion.
         """
-        good = np.flatnonzero(np.isfinite(self.gap + self.design.sum(axis=0)))
+        good = np.flatnonzero(~expansion.failed)
         count = len(parameters)
         number = np.tile(good, count)
         each = parameters[np.repeat(np.arange(count), len(good))]
         landed = self._simulated(each, self.draws[number], number).reshape(count, -1)
-        return np.log(self.landings[good] / landed) / self.spread[good]
+        return np.log(self.landings[good] / landed) / expansion.spread[good]
 
     def _simulated(
         self, parameters: Parameters, draws: np.ndarray, number: np.ndarray
@@ -133,13 +173,13 @@ class LaunchLikelihood:
         setup, history = self.setup, self.setup.history
         if history:
             setup = replace(setup, history=replace(history, deepest=self.deepest[number]))
-        done = launch(self.sling, setup, parameters, draws, workers=2)
+        done = launch(self.sling, setup, parameters, draws, workers=self.workers)
         failed = np.array([why is not None for why in done.failure])
         return np.where(failed, np.nan, done.landing_y)
 
 
 def without_each(
-    launches: LaunchLikelihood, hessian: np.ndarray, gradient: np.ndarray, widened: float = 1.0
+    launches: LaunchExpansion, hessian: np.ndarray, gradient: np.ndarray, widened: float = 1.0
 ) -> np.ndarray:
     """How unlikely each launch is by all other evidence, as a standard score (leave-one-out).
 
@@ -154,10 +194,10 @@ def without_each(
         Shape (N,); positive where it landed further than predicted, NaN for a launch that fails.
     """
     scores = np.full(len(launches.gap), np.nan)
-    for i, (gap, slope) in enumerate(zip(launches.gap, launches.design.T, strict=True)):
-        if np.isfinite(gap + slope.sum()):
-            rest = hessian - np.outer(slope, slope)
-            left = gap - slope @ np.linalg.solve(rest, gradient - slope * gap)
-            variance = 1 + widened**2 * slope @ np.linalg.solve(rest, slope)
-            scores[i] = left / np.sqrt(variance)
+    for i in np.flatnonzero(~launches.failed):
+        gap, slope = launches.gap[i], launches.design[:, i]
+        rest = hessian - np.outer(slope, slope)
+        left = gap - slope @ np.linalg.solve(rest, gradient - slope * gap)
+        variance = 1 + widened**2 * slope @ np.linalg.solve(rest, slope)
+        scores[i] = left / np.sqrt(variance)
     return scores

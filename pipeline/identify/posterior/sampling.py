@@ -59,8 +59,8 @@ class Remaining:
                 self.recordings, fitted.expansions, fitted.nuisances, strict=True
             )
         ]
-        if self.launches:
-            left.append(self.launches.remaining(parameters))
+        if self.launches and fitted.launches:
+            left.append(self.launches.remaining(parameters, fitted.launches))
         return np.concatenate(left, axis=1)
 
 

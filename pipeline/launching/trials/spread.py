@@ -21,11 +21,13 @@ class Spread:
     """Landings of N draws.
 
     Attributes:
-        centres: With each sample of θ, or with θ alone [m], shape (N, M); NaN where one fails.
+        chosen: Numbers of the samples of θ that are launched, shape (M,); None: θ alone is.
+        centres: With each of them [m], shape (N, M); NaN where one fails.
         slope: Standard deviation by the error of the draw [m], shape (N,).
         interval: The shortest that holds 90 % [m], shape (N, 2); NaN where launches fail.
     """
 
+    chosen: np.ndarray | None
     centres: np.ndarray
     slope: np.ndarray
     interval: np.ndarray
@@ -58,9 +60,10 @@ def landing_spread(
     count = len(draws)
     landing, gradient = landing_gradient(lambda around: _landing(launcher(around)), draws)
     spread = error * np.linalg.norm(gradient, axis=1)
-    centres = landing[:, None]
+    chosen, centres = None, landing[:, None]
     if samples is not None:
-        some = samples[np.linspace(0, len(samples) - 1, min(MOST, len(samples))).astype(int)]
+        chosen = np.linspace(0, len(samples) - 1, min(MOST, len(samples))).astype(int)
+        some = samples[chosen]
         launched = launcher(
             np.repeat(draws, len(some), axis=0), some[np.tile(np.arange(len(some)), count)]
         )
@@ -71,7 +74,7 @@ def landing_spread(
         if len(good) >= 0.9 * len(centre) and np.isfinite(width):
             centre, kernel = smoothed(good)
             result[row] = shortest((centre[:, None] + np.hypot(width, kernel) * ERRORS).ravel())
-    return Spread(centres, spread, result)
+    return Spread(chosen, centres, spread, result)
 
 
 def smoothed(values: np.ndarray) -> tuple[np.ndarray, float]:

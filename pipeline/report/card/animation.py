@@ -31,6 +31,7 @@ DOT = 1  # radius of a point
 GREY, PALE = "#8a8a8a", "#c9c9c9"
 AGED, FADES = 0.03, 0.55  # s after which clouds and pictures are pale; how far pictures fade
 VEIL = 90  # the grey that they fade to
+Frame = tuple[Image.Image, int]  # and how long it is shown [ms]
 
 
 def animate(
@@ -38,20 +39,19 @@ def animate(
 ) -> None:
     """Write the animation."""
     drawn = ReleaseFrames(episode, simulated, pictures, fork_width)
-    times = np.arange(BEGIN, END + STEP / 2, STEP) + simulated.release
-    # the moment of each new picture comes in too, so that it is compared with its own state
-    taken = pictures.time + simulated.camera
-    new = taken[(taken > times[0]) & (taken < times[-1])]
-    times = np.union1d(times, new)
-    times = times[times <= new[-1]] if len(new) else times  # it ends as it compares
-    lasts = np.diff(times, append=times[-1] + STEP) * 1000 * SLOWER
-    lasts[np.isin(times, new)] += LOOK
-    lasts[-1] = LAST
-    frames = [drawn.frame(time) for time in times]
+    frames = drawn.around_release(BEGIN, END)
+    looked_at = [n for n, (_, shown) in enumerate(frames) if shown >= LOOK]
+    frames = frames[: looked_at[-1] + 1] if looked_at else frames  # it ends as it compares
+    save(path, [*frames[:-1], (frames[-1][0], LAST)], QUALITY)
+
+
+def save(path: Path, frames: list[Frame], quality: int) -> None:
+    """Write frames as an animated WebP."""
+    images, shown = zip(*frames, strict=True)
     with replacing(path) as temporary:
-        frames[0].save(
-            temporary, format="webp", save_all=True, append_images=frames[1:], loop=0,
-            duration=[round(last) for last in lasts], quality=QUALITY, method=4,
+        images[0].save(
+            temporary, format="webp", save_all=True, append_images=images[1:], loop=0,
+            duration=list(shown), quality=quality, method=4,
         )  # fmt: skip
 
 
@@ -80,6 +80,19 @@ class ReleaseFrames:
     @cached_property
     def _view(self) -> CameraView:
         return CameraView.of(self.pictures, self.simulated, (WIDE, TALL), self.begin)
+
+    def around_release(self, begin: float, end: float) -> list[Frame]:
+        """Frames from `begin` to `end` [s] of the release.
+
+        The moment of each new picture comes in too, so that it is compared with its own state; it
+        is shown LOOK longer.
+        """
+        times = np.arange(begin, end + STEP / 2, STEP) + self.simulated.release
+        new = self._taken[(self._taken > times[0]) & (self._taken < times[-1])]
+        times = np.union1d(times, new)
+        shown = np.diff(times, append=times[-1] + STEP) * 1000 * SLOWER
+        shown[np.isin(times, new)] += LOOK
+        return [(self.frame(time), round(ms)) for time, ms in zip(times, shown, strict=True)]
 
     def frame(self, time: float) -> Image.Image:
         canvas = self._background.copy()

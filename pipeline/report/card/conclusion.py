@@ -33,9 +33,9 @@ class Conclusion:
         """
         known, aims, samples = findings(inputs, force), inputs.aims, inputs.samples
         verdict, against = judge(known)
-        model = None
-        if samples is not None:
-            landings = aims.samples, aims.slope, aims.half_width
+        model, spread = None, aims.spread
+        if samples is not None and spread.chosen is not None:
+            landings = spread.chosen, spread.centres, spread.slope, aims.half_width
             model = LandingModel.of(samples.names, samples.values, *landings)
         steps = next_steps(
             inputs.band,

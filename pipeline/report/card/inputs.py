@@ -15,7 +15,7 @@ from pipeline.episode.episode import Episode
 from pipeline.identify.results.theta import load_samples, load_theta, parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
-from pipeline.launching.trials.spread import landing_spread
+from pipeline.launching.trials.spread import Spread, landing_spread
 from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
 from pipeline.params import Params
 from pipeline.simulator.launch import Launches, limited
@@ -32,8 +32,7 @@ class Aims:
         interval: Of 90 % of the landings, the shortest [m], shape (T, 2); NaN where not known.
         failure: None, or why a launch fails, length T.
         stretch: Of the drawn band, shape (T,).
-        slope: Standard deviation of a landing by the error of the draw [m], shape (T,).
-        samples: Landings with samples of θ [m], shape (T, M); none without samples.
+        spread: Of the landings.
     """
 
     target: np.ndarray
@@ -43,8 +42,7 @@ class Aims:
     hold_force: np.ndarray
     failure: list[str | None]
     stretch: np.ndarray
-    slope: np.ndarray
-    samples: np.ndarray
+    spread: Spread
 
     @property
     def half_width(self) -> np.ndarray:
@@ -157,6 +155,5 @@ def aims(
         hold_force=launches.hold_force,
         failure=launches.failure,
         stretch=stretch(np.insert(draw, 0, 0, axis=1)),
-        slope=spread.slope,
-        samples=np.zeros((len(draw), 0)) if samples is None else spread.centres,
+        spread=spread,
     )

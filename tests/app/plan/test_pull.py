@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -19,7 +19,6 @@ PARAMS = with_(load(DEFAULTS), "plan", dips=())
 AHEAD = np.array([0.0, 1.0, 0.0])
 
 
-@settings(deadline=None)
 @given(width=st.floats(0.02, 2), ratio=st.floats(1.001, 50))
 def test_the_catenary_of_that_sag_has_that_length(width, ratio) -> None:
     """z = a cosh(x / a), a from the sag alone, integrated along the curve."""
@@ -97,7 +96,6 @@ PLANS = st.fixed_dictionaries(
 ).map(whole)
 
 
-@settings(deadline=None, max_examples=100)
 @given(
     content=PLANS,
     pulls=st.integers(1, 3),
@@ -132,7 +130,6 @@ def test_each_of_several_pulls_is_the_first_again_and_finds_the_band_calm(
         np.testing.assert_allclose(way.position(begin), way.position(0.0), atol=1e-9)
 
 
-@settings(deadline=None, max_examples=100)
 @given(content=PLANS, angle=number(-1.5, 1.5), duration=number(1, 120), share=number(0.01, 0.9))
 def test_any_plan_rests_in_time_and_within_its_limits(content, angle, duration, share) -> None:
     plan = PlanParams.model_validate(content)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
@@ -21,7 +21,6 @@ TRAJECTORY = st.builds(
 )
 
 
-@settings(deadline=None)
 @given(length=st.floats(1e-3, 3), speed=st.floats(0.01, 3), acceleration=st.floats(0.05, 30))
 def test_a_leg_meets_one_limit_and_keeps_the_other(length, speed, acceleration) -> None:
     time = leg_time(length, speed, acceleration)
@@ -33,7 +32,6 @@ def test_a_leg_meets_one_limit_and_keeps_the_other(length, speed, acceleration) 
     assert leg.peaks(2)[0] == pytest.approx(8 * length / time**2, rel=1e-9)
 
 
-@settings(deadline=None, max_examples=50)
 @given(trajectory=TRAJECTORY, part=st.floats(0.0, 1.0))
 def test_derivatives_are_those_of_the_position(trajectory, part) -> None:
     step = 1e-5
@@ -49,7 +47,6 @@ def test_derivatives_are_those_of_the_position(trajectory, part) -> None:
         )
 
 
-@settings(deadline=None, max_examples=50)
 @given(trajectory=TRAJECTORY)
 def test_smooth_to_the_second_derivative_and_at_rest_between_phases(trajectory) -> None:
     ends = [phase.to for phase in trajectory.phases]
@@ -67,7 +64,6 @@ def test_smooth_to_the_second_derivative_and_at_rest_between_phases(trajectory) 
         np.testing.assert_allclose(still, 0, atol=1e-9 * scale)
 
 
-@settings(deadline=None, max_examples=50)
 @given(
     points=st.lists(POINT, min_size=4, max_size=8),
     gaps=st.lists(st.floats(0.1, 2), min_size=8, max_size=8),

@@ -150,14 +150,3 @@ def test_what_is_there_or_cannot_be_used_is_refused_and_nothing_is_copied(
         assert "\n" not in str(caught.value) and contents(project) == written
     with pytest.raises(UserError, match="--band"):
         more(project, three[0], band="blue")
-
-
-def test_a_recording_where_it_once_lay_is_told_how_to_move(project, seen, three) -> None:
-    """As it says, and then it is the band's."""
-    add(project, seen[0])
-    folder, old = project / "data/raw/red", project / "data/raw/red.mcap"
-    (folder / "seen.mcap").rename(old)
-    with pytest.raises(UserError, match=r"red.mcap: .* lie in a folder now: mkdir -p .* && mv"):
-        more(project, three[0])
-    old.rename(folder / "red.mcap")
-    more(project, three[0])

@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.identify.objective import engine, session
-from pipeline.identify.objective.engine import simulate_of, sources_of
+from pipeline.identify.objective.engine import simulate_of
 from pipeline.identify.objective.evaluate import simulated
 from pipeline.params.identification import ENGINES, OUR_ENGINE
 from tests.identify.objective import toy_engine
@@ -19,7 +19,6 @@ from validation.engines.physx import rollouts
 
 def test_ours_needs_no_import() -> None:
     assert simulate_of("sling") is simulated
-    assert sources_of("sling") == []
 
 
 def test_an_installed_engine_is_found_by_its_name(monkeypatch) -> None:
@@ -64,9 +63,3 @@ def test_another_engine_changes_the_loss_and_gets_whole_batches(monkeypatch) -> 
     assert toy_engine.batches == [20]
     both = np.isfinite(ours.total) & np.isfinite(others.total)
     assert both.sum() > 5 and (ours.total[both] != others.total[both]).all()
-
-
-def test_its_folder_is_among_the_sources() -> None:
-    assert [
-        source.name for source in sources_of("tests.identify.objective.toy_engine:simulate")
-    ] == ["objective"]

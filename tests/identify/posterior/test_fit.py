@@ -9,8 +9,9 @@ import pytest
 from pipeline.identify.posterior import fit as module
 from pipeline.identify.posterior.fit import BINNED, NoFit, fit
 from pipeline.identify.posterior.identify import birge_ratio, leave_one_out
+from pipeline.identify.posterior.launches import LaunchExpansion
 from pipeline.identify.posterior.sampling import samples_around
-from tests.identify.posterior.toy import SIZE, Curve, curve, least, space
+from tests.identify.posterior.toy import SIZE, Curve, curve, least, slopes, space
 
 TRUE = np.array([8.0, 9.0, 3.0]) * SIZE
 START = np.array([7.0, 7.0, 4.0]) * SIZE
@@ -77,15 +78,52 @@ def test_a_prior_pulls_as_far_as_scipy_says():
 
 def test_launches_count_as_a_recording_does():
     first, second = curves(2)
-    launches = SimpleNamespace(
-        expand=lambda points, phi, steps: (
-            (expansion := second.expand(points, phi, steps, None, None)).misfit,
-            expansion.hessian,
-            expansion.gradient,
-        )
-    )
-    result = fit([first], space(), START, launches=launches)
+    result = fit([first], space(), START, launches=Launches(second))
     assert away(result, least([first, second], space(), START)) < 0.05
+
+
+class Launches:
+    """A curve's samples as launches, which fail where `fails` says so; it keeps what it told."""
+
+    def __init__(self, of: Curve, fails=lambda phi: False) -> None:
+        self.of, self.fails, self.told = of, fails, []
+
+    def expand(self, points, phi, steps) -> LaunchExpansion:
+        left, design = self.of.seen - curve(phi), slopes(phi) / self.of.sigma
+        if self.fails(phi):
+            left, design = np.full_like(left, np.nan), 0 * design
+        self.told.append(LaunchExpansion(left, np.full(40, self.of.sigma), design))
+        return self.told[-1]
+
+
+def test_a_step_into_failing_launches_is_taken_shorter():
+    """As one into a recording's failure: what they no longer cost is no reward."""
+    first, second = curves(2)
+    fit([first], space(), START, launches=Launches(second))
+    there, again = first.requested[1], curves(2)[0]
+    launches = Launches(second, lambda phi: np.allclose(phi, there, atol=0.2 * SIZE))
+    result = fit([again], space(), START, launches=launches)
+    assert launches.told[1].failed.all() and launches.told[1].misfit == 0
+    assert not result.launches.failed.any()
+    assert away(result, least([first, second], space(), START)) < 0.05
+    went, goes = (np.linalg.norm((again.requested[k] - START) / SIZE) for k in (1, 2))
+    assert goes < 0.8 * went
+
+
+def test_launches_that_fail_at_the_start_count_once_they_land():
+    first, second = curves(2)
+    launches = Launches(second, lambda phi: phi[1] < 8 * SIZE[1])
+    result = fit([first], space(), START, launches=launches)
+    assert launches.told[0].failed.all() and not result.launches.failed.any()
+    assert away(result, least([first, second], space(), START)) < 0.05
+
+
+def test_the_fit_keeps_the_launches_of_its_mode():
+    """Not those of a step that was tried last and did not get nearer."""
+    first, second = curves(2)
+    launches = Launches(second)
+    result = fit([first], space(), START, launches=launches)
+    np.testing.assert_array_equal(result.launches.left, second.seen - curve(result.phi))
 
 
 def test_a_step_into_failure_is_taken_shorter():

@@ -68,13 +68,13 @@ def test_a_model_is_read_off_samples() -> None:
     samples = np.exp(phi) * centre
     samples[:, 3] = 0.5 + phi[:, 3]  # no logarithm
     samples = np.column_stack([samples, np.full(500, 0.47)])
-    some = np.linspace(0, 499, 60).astype(int)
+    some = RNG.choice(500, 60, replace=False)  # whichever they are
     landings = 1.9 + GRADIENT @ phi[some].T
     draw, half_width = np.array([0.02, 0.03]), np.array([0.1, 0.11])
     names = [*NAMES, "poissons_ratio"]
-    model = LandingModel.of(names, samples, landings, draw, half_width)
+    model = LandingModel.of(names, samples, some, landings, draw, half_width)
     assert model.names == NAMES and list(unknowns(names, samples)) == NAMES
     np.testing.assert_allclose(model.gradient, GRADIENT, atol=1e-9)
     np.testing.assert_allclose(model.covariance, np.cov(phi.T), atol=1e-9)
-    assert LandingModel.of(names, samples, landings, draw, np.array([np.nan, 0.1])) is None
-    assert LandingModel.of([], np.zeros((0, 0)), landings, draw, half_width) is None
+    assert LandingModel.of(names, samples, some, landings, draw, np.array([np.nan, 0.1])) is None
+    assert LandingModel.of([], np.zeros((0, 0)), some, landings, draw, half_width) is None

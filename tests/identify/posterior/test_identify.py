@@ -159,6 +159,17 @@ def test_samples_are_worth_many_and_said(first):
     assert identify.SAMPLES / 4 < told_of(first)["effective_samples"] <= identify.SAMPLES + 1e-6
 
 
+def test_constant_coordinates_correlate_with_nothing():
+    """Not even with each other, as those that lie at a bound in all samples."""
+    some = np.random.default_rng(0).normal(size=(200, 2))
+    samples = np.column_stack([some, np.full(200, 0.1), np.full(200, 0.3)])
+    expected = np.eye(4)
+    expected[:2, :2] = np.corrcoef(some.T)
+    np.testing.assert_allclose(identify.correlation(samples), expected)
+    np.testing.assert_array_equal(identify.correlation(samples[:, 2:]), np.eye(2))
+    np.testing.assert_array_equal(identify.correlation(samples[:, 1:3]), np.eye(2))
+
+
 def test_workers_change_no_byte(exact, first):
     again = found_of(exact[0], workers=1)
     np.testing.assert_array_equal(again.parameters.values, first.parameters.values)

@@ -29,10 +29,10 @@ def summary(params):
 
     def by(count: int):
         observed = [Observed(DRAW, 0.001, FURTHER * float(once.landing_y[0]))] * count
-        _, hessian, gradient = LaunchLikelihood(observed, sling, setup).expand(
+        told = LaunchLikelihood(observed, sling, setup).expand(
             coordinates.parameters, phi, coordinates.steps
         )
-        return precision + hessian, gradient
+        return precision + told.hessian, told.gradient
 
     precision = np.diag(coordinates.precision + 1e2)  # as if recordings showed each within 0.1
     return coordinates.names, precision, by

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from pipeline.launching.trials.spread import MOST, landing_intervals, shortest, smoothed
+from pipeline.launching.trials.spread import (
+    MOST,
+    landing_intervals,
+    landing_spread,
+    shortest,
+    smoothed,
+)
 from pipeline.simulator.launch import CROSS
 from tests.policy import toy
 
@@ -85,7 +91,10 @@ def test_an_answer_takes_few_launches() -> None:
         launched.append(len(draws))
         return launcher(draws, thetas)
 
-    few = landing_intervals(counted, DRAWS[:1], samples(2000), 0.001)
-    assert sum(launched) == len(CROSS) + MOST
+    spread = landing_spread(counted, DRAWS[:1], samples(2000), 0.001)
+    few = spread.interval
+    assert sum(launched) == len(CROSS) + MOST and len(spread.chosen) == MOST
+    again = launcher(np.repeat(DRAWS[:1], MOST, axis=0), samples(2000)[spread.chosen])
+    np.testing.assert_array_equal(spread.centres[0], again.landing_y)  # it says which they are
     many = np.quantile(toy.launch(DRAWS[:1]).landing_y * samples(2000)[:, 0], [0.05, 0.95])
     np.testing.assert_allclose(few[0], many, rtol=0.02)

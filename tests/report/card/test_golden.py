@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.launching.trials.spread import Spread
 from pipeline.report.card.conclusion import Conclusion
 from pipeline.report.card.inputs import Aims, CardInputs
 from pipeline.report.card.text import card_text
@@ -16,16 +17,21 @@ from tests.golden import expect_golden
 
 GOLDEN = Path(__file__).parent / "golden"
 LANDINGS = np.array([1.726, 1.924, 2.123])
+INTERVAL = LANDINGS[:, None] + [-0.112, 0.123]
 AIMS = Aims(
     target=np.array([1.725, 1.925, 2.125]),
     draw=np.array([[-0.31, -0.17], [-0.33, -0.18], [-0.35, -0.19]]),
     landing=LANDINGS,
-    interval=LANDINGS[:, None] + [-0.112, 0.123],
+    interval=INTERVAL,
     hold_force=np.array([8.123, 8.678, 9.234]),
     failure=[None, None, None],
     stretch=np.array([1.4, 1.45, 1.5]),
-    slope=np.array([0.03, 0.031, 0.032]),
-    samples=LANDINGS[:, None] + np.linspace(-0.1, 0.1, 40),
+    spread=Spread(
+        chosen=np.arange(40),
+        centres=LANDINGS[:, None] + np.linspace(-0.1, 0.1, 40),
+        slope=np.array([0.03, 0.031, 0.032]),
+        interval=INTERVAL,
+    ),
 )
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -10,8 +11,6 @@ from tests.validation.engines.test_mesh import elastic_force
 from validation.engines import checks
 from validation.engines.mujoco_flex import FlexBand
 from validation.simulator.finding import unmet
-
-mujoco = pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[validation]'")
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ from scipy.optimize import least_squares
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip
+from pipeline.simulator.rubber import RUBBER
 from validation.simulator.agreement import random_thetas
 from validation.simulator.at_rest import STRING
 from validation.simulator.closed import String, oscillation
@@ -74,10 +75,11 @@ def recoil(
         motion = move(bench, loose, parameters, table, start, gravity=0.0, **options)
         for k in np.flatnonzero(~motion.failed):
             rod = ReferenceRod(loose, parameters[[k]], gravity=0.0)
-            memory = remembered(rod, table, motion.start[k], motion.x[k])
-            band = replace(rod, worst=memory.worst[1:])
-            total = band.elastic(motion.x[k]) + rod.kinetic(motion.v[k]) + memory.free
-            first = rod.elastic(motion.start[k])
+            first, total = rod.elastic(motion.start[k]), rod.kinetic(motion.v[k])
+            if sling.law == RUBBER:
+                memory = remembered(rod, table, motion.start[k], motion.x[k])
+                rod, total = replace(rod, worst=memory.worst[1:]), total + memory.free
+            total = total + rod.elastic(motion.x[k])
             energies.append(np.append(first, total) / first)
     return np.reshape(energies, (-1, len(table) + 1))
 

@@ -8,7 +8,6 @@ STARTED_TWICE = """
 import time
 from concurrent.futures import ThreadPoolExecutor
 import warp._src.context as context
-
 from pipeline.identify.objective.kernel import chamfer_kernel
 
 starts, runtime = [], context.Runtime

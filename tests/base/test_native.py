@@ -1,13 +1,13 @@
 """The guard around Warp, which is not made for several threads at its start, and its compiler."""
 
+import pytest
+
 from tests.project import python
 
 STARTED_TWICE = """
 import time
 from concurrent.futures import ThreadPoolExecutor
 import warp._src.context as context
-import pytest
-
 from pipeline.identify.objective.kernel import chamfer_kernel
 
 starts, runtime = [], context.Runtime

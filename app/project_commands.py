@@ -7,6 +7,7 @@ from pathlib import Path
 
 from app import arguments as kinds
 from app.command_line import Done, command, flag
+from pipeline.base.disk import expect_ready
 
 
 @command(
@@ -47,13 +48,20 @@ def reset(arguments: argparse.Namespace) -> Done:
     flag("--slurm", type=Path, metavar="FILE", help="of SLURM jobs, which run"),
 )
 def flow(arguments: argparse.Namespace) -> Done:
-    from pipeline.flow.run import run
+    from pipeline.flow import dvc, server
     from pipeline.params import load
 
+    root = Path.cwd()
     if Path("params.yaml").exists():
         load()  # a mistake in it is reported once, and not by each of them
-    options = {name: getattr(arguments, name) for name in ("workers", "gpus", "dask", "slurm")}
-    return run(Path.cwd(), arguments.targets, **options)
+    expect_ready(root)
+    graph = dvc.stale(root, arguments.targets)
+    if not graph:
+        return "nothing is stale"
+    server.configure(root)
+    from pipeline.flow.flow import run
+
+    return run(root, graph, arguments.workers, arguments.gpus, arguments.dask, arguments.slurm)
 
 
 @command(

@@ -8,10 +8,12 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import networkx
 import psutil
@@ -24,12 +26,20 @@ from pipeline.base.machine import cores
 DVC = (sys.executable, "-P", "-m", "dvc", "--wait-for-lock")
 GRACE = 15.0  # s that interrupted stages and DVC have to end
 # What DVC says of itself, beside which stage it runs.
-CHATTER = re.compile(
-    "(> |Updating|Generating|To track|\tgit add|To enable|\tdvc|Use `dvc|Data and)"
-)
+CHATTER = re.compile("> |Updating|Generating|To track|\tgit add|To enable|\tdvc|Use `dvc|Data and")
 FAILED = re.compile("ERROR: (?:failed to reproduce '.+?': )?(?:failed to run: .*with (-?[0-9]+))?")
 
+PIPED: dict[str, Any] = {
+    "stdin": subprocess.DEVNULL,
+    "stdout": subprocess.PIPE,
+    "stderr": subprocess.STDOUT,
+    "encoding": "utf-8",
+    "errors": "replace",
+    "start_new_session": True,  # a terminal's Ctrl-C is for us alone
+}
+
 _running: set[subprocess.Popen] = set()
+_ending = threading.Event()
 
 
 class StageFailed(UserError):
@@ -54,8 +64,8 @@ def stale(root: Path, targets: Sequence[str] = ()) -> networkx.DiGraph:
     if not (status or targets):
         return networkx.DiGraph()
     graph = graph_of(root)
-    names = {*status} & {*graph}
-    names = names.union(*(networkx.descendants(graph, name) for name in names))
+    first = [name for name in graph if name in status]
+    names = {*first}.union(*(networkx.descendants(graph, name) for name in first))
     if targets:
         ends = {name for target in targets for name in named(target, graph)}
         names &= ends.union(*(networkx.ancestors(graph, name) for name in ends))
@@ -80,22 +90,18 @@ def named(target: str, stages: Iterable[str]) -> set[str]:
 
     A group's prefix may be left out: `theta@band1-de` finds `ablation_theta@band1-de`.
     """
-    called = {name: (name, name.partition("@")[0]) for name in stages}
-    found = {name for name, words in called.items() if target in words}
-    found = found or {
-        name for name, words in called.items() if any(w.endswith(f"_{target}") for w in words)
-    }
-    if not found:
-        raise UserError(f"{target}: no stage of dvc.yaml; `dvc stage list` has all")
-    return found
+    for prefix in ("", ".+_"):
+        shape = f"{prefix}{re.escape(target)}(@.+)?"
+        if found := {name for name in stages if re.fullmatch(shape, name)}:
+            return found
+    raise UserError(f"{target}: no stage of dvc.yaml; `dvc stage list` has all")
 
 
 def _said(root: Path, *arguments: str) -> str:
     """What a DVC command prints. Raises UserError."""
     done = subprocess.run([*DVC, *arguments], cwd=root, capture_output=True, encoding="utf-8")
     if done.returncode:
-        why = cause(done.stderr.splitlines(), done.returncode)
-        raise UserError(f"dvc {arguments[0]}: {why}")
+        raise UserError(f"dvc {arguments[0]}: {cause(done.stderr.splitlines(), done.returncode)}")
     return done.stdout
 
 
@@ -134,38 +140,36 @@ def repro(
     Raises:
         StageFailed: With the name of the stage that failed, and why.
     """
-    process = subprocess.Popen(
-        [*DVC, "repro", *options, target],
-        cwd=root,
-        env=env or environment(),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        encoding="utf-8",
-        errors="replace",
-        start_new_session=True,  # a terminal's Ctrl-C is for us alone
-    )
-    _running.add(process)
+    if _ending.is_set():
+        raise StageFailed(f"{target}: interrupted")
     name, output = target, []
+    command = [*DVC, "repro", *options, target]
+    process = subprocess.Popen(command, cwd=root, env=env or environment(), **PIPED)
+    _running.add(process)
     try:
         for line in map(str.rstrip, process.stdout or ()):
             output.append(line)
             if begun := re.fullmatch("Running stage '(.+)':", line):
                 name = begun[1]
-            if line and not (CHATTER.match(line) or FAILED.match(line)):
+            if line and not CHATTER.match(line) and not line.startswith("ERROR: failed to repro"):
                 on_line(line)
         process.wait()
     finally:
-        end([process])
+        _end([process])
         _running.discard(process)
     if process.returncode:
         raise StageFailed(with_disk(f"{name}: {cause(output, process.returncode)}", root))
     return output
 
 
-def end(children: Collection[subprocess.Popen] = _running) -> None:
+def end_all() -> None:
+    """End all stages that run, in whatever threads; none begins from now on."""
+    _ending.set()
+    _end([*_running])
+
+
+def _end(children: Sequence[subprocess.Popen]) -> None:
     """Interrupt stages, so that DVC ends itself, which may be writing dvc.lock; then kill."""
-    children = [*children]
     deadline = time.monotonic() + GRACE
     while time.monotonic() < deadline and (alive := [c for c in children if c.poll() is None]):
         for child in alive:

@@ -1,14 +1,16 @@
-"""The flow of Prefect's: a task a stage, submitted when its producers are done.
+"""`sling flow`: a flow of Prefect's; a task is a stage, submitted when its producers are done.
 
-`run` has imported this after it has set the project's settings of Prefect.
+To be imported when `server.configure` has set the project's settings of Prefect.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import time
+from collections import Counter
 from pathlib import Path
 from queue import SimpleQueue
+from typing import Any
 
 import networkx
 from prefect import flow, get_run_logger, task
@@ -20,43 +22,78 @@ from prefect.client.schemas.objects import State
 from prefect.states import Completed, Failed
 from prefect.task_runners import ThreadPoolTaskRunner
 
+from pipeline.base.errors import UserError
+from pipeline.base.machine import cores
 from pipeline.base.progress import parse
-from pipeline.flow import dvc
-
-GPU = "gpu"  # tag of tasks that compute on a GPU
+from pipeline.flow import cluster, dvc
 
 
-def perform(
+def run(
     root: Path,
     graph: networkx.DiGraph,
-    env: Mapping[str, str],
-    workers: int,
-    gpus: int | None,
-) -> dict[str, State]:
-    """Run stages; how each ended: Completed, Cached, Fresh, Failed, or NotReady.
+    workers: int | None = None,
+    gpus: int | None = None,
+    dask: str | None = None,
+    slurm: Path | None = None,
+) -> str:
+    """Run stages.
 
     Args:
         root: The working copy.
         graph: As `dvc.stale` gives it.
-        env: Environment of each stage.
-        workers: Stages at a time.
-        gpus: Stages at a time that compute on a GPU; None: no limit.
+        workers: Stages at a time; default as many as cores, which they share, or as `cluster.there`
+            says.
+        gpus: Stages at a time that compute on a GPU; default 1 where SLING_DEVICE is CUDA.
+        dask: Address of the scheduler whose workers run the stages.
+        slurm: File that says which jobs run them.
+
+    Returns:
+        One line: how many stages ended in which of Prefect's states.
+
+    Raises:
+        UserError: A stage failed, with that line and what failed; or no cluster answers.
     """
+    start = time.monotonic()
+    with cluster.there(dask, slurm) as (address, slots):
+        workers = workers or slots or cores()
+        env = dvc.environment(max(1, cores() // workers)) | address
+        gpus = gpus or (1 if env.get("SLING_DEVICE", "").startswith("cuda") else None)
+        if gpus:
+            with get_client(sync_client=True) as client:
+                client.upsert_global_concurrency_limit_by_name("tag:gpu", gpus)
+                free = GlobalConcurrencyLimitUpdate(active_slots=0)  # a killed flow gave none back
+                client.update_global_concurrency_limit("tag:gpu", free)
+        print(f"{len(graph)} stages, {workers} at a time", flush=True)
+        states = _perform(root, graph, env, workers, limited=gpus is not None)
+    counts = Counter(str(state.name) for state in states.values())
+    words = ", ".join(f"{count} {name}" for name, count in counts.items())
+    failed = [f"; {state.message}" for state in states.values() if state.is_failed()]
+    summary = f"stages: {words} ({time.monotonic() - start:.0f} s){''.join(failed)}"
+    if failed:
+        raise UserError(summary)
+    return summary
+
+
+def _perform(
+    root: Path, graph: networkx.DiGraph, env: dict[str, str], workers: int, limited: bool
+) -> dict[str, State]:
+    """Run stages; how each ended: Completed, Cached, Fresh, Failed, or NotReady."""
+    runner: Any = ThreadPoolTaskRunner(max_workers=workers)
     states: dict[str, State] = {}
 
     @task(cache_policy=NO_CACHE)
     def stage(name: str) -> State:
-        return _repro(root, name, env | ({"SLING_ON_GPU": "1"} if graph.nodes[name]["gpu"] else {}))
+        return _repro(root, name, env)
 
-    @flow(name="sling flow", task_runner=ThreadPoolTaskRunner(max_workers=workers))
+    @flow(name="sling flow", task_runner=runner)
     def sling_flow(stages: list[str]) -> State:
         waiting, futures, ended = [*stages], {}, SimpleQueue()
         try:
             while len(states) < len(stages):
                 for name in [n for n in waiting if states.keys() >= {*graph.predecessors(n)}]:
                     waiting.remove(name)
-                    tags = [GPU] if gpus and graph.nodes[name]["gpu"] else []
-                    named = stage.with_options(task_run_name=name, tags=tags)
+                    tags = ["gpu"] if limited and graph.nodes[name]["gpu"] else []
+                    named: Any = stage.with_options(task_run_name=name, tags=tags)
                     producers = [futures[producer] for producer in graph.predecessors(name)]
                     futures[name] = named.submit(name, wait_for=producers)
                     futures[name].add_done_callback(lambda _, name=name: ended.put(name))
@@ -65,23 +102,18 @@ def perform(
                 states[name] = futures[name].state
                 print(f"{name} | {states[name].name}", flush=True)
         except BaseException:
-            dvc.end()
+            dvc.end_all()
             raise
-        failed = [name for name in stages if states[name].is_failed()]
-        return Failed(message=f"failed: {', '.join(failed)}") if failed else Completed()
+        return Failed() if any(state.is_failed() for state in states.values()) else Completed()
 
-    if gpus:
-        with get_client(sync_client=True) as client:
-            client.upsert_global_concurrency_limit_by_name(f"tag:{GPU}", gpus)
-            free = GlobalConcurrencyLimitUpdate(active_slots=0)  # a killed flow gave none back
-            client.update_global_concurrency_limit(f"tag:{GPU}", free)
     # Who has most to follow comes first, and so producers before consumers.
     order = sorted(graph, key=lambda name: -len(networkx.descendants(graph, name)))
-    sling_flow(order, return_state=True)
+    whole: Any = sling_flow
+    whole(order, return_state=True)
     return states
 
 
-def _repro(root: Path, name: str, env: Mapping[str, str]) -> State:
+def _repro(root: Path, name: str, env: dict[str, str]) -> State:
     """Have DVC run a stage: its lines go to Prefect, and how far it is as a progress artifact."""
     logger, bar = get_run_logger(), None
 
@@ -98,10 +130,8 @@ def _repro(root: Path, name: str, env: Mapping[str, str]) -> State:
                 bar = create_progress_artifact(percent, key, step.counted)
 
     try:
-        output = dvc.repro(root, name, on_line, ["-s"], env)
+        output = "\n".join(dvc.repro(root, name, on_line, ["-s"], env))
     except dvc.StageFailed as error:
         return Failed(message=str(error))
-    for words, state in ("is cached - skipping", "Cached"), ("didn't change, skipping", "Fresh"):
-        if any(words in line for line in output):
-            return Completed(name=state)
-    return Completed()
+    fresh = "Fresh" if "didn't change, skipping" in output else "Completed"
+    return Completed(name="Cached" if "is cached - skipping" in output else fresh)

@@ -12,23 +12,23 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_text
 
 HOST, PORT = "127.0.0.1", 4200
 ASKING = 5.0  # s that a server has to answer
 
 
-def environment(root: Path) -> dict[str, str]:
-    """This process's environment with the project's settings of Prefect, and nobody else's.
+def configure(root: Path) -> None:
+    """Give this process the project's settings of Prefect, which is not imported yet.
 
-    To be set before `prefect` is imported. The server is that of `sling ui` where it runs, else
-    Prefect starts one for the process. Without proxies: it is here, and Prefect's client refuses to
+    The server is that of `sling ui` where it runs, else Prefect starts one for the process. Nobody
+    else's settings count. Without proxies: the server is here, and Prefect's client refuses to
     start by those of SOCKS.
     """
-    foreign = [n for n in os.environ if n.startswith("PREFECT_") or n.lower().endswith("_proxy")]
-    where = address(root)
-    return {name: text for name, text in os.environ.items() if name not in foreign} | {
-        **({"PREFECT_API_URL": f"{where}/api"} if where else {}),
+    for name in [n for n in os.environ if n.startswith("PREFECT_") or n.lower().endswith("_proxy")]:
+        del os.environ[name]
+    if where := address(root):
+        os.environ["PREFECT_API_URL"] = f"{where}/api"
+    os.environ |= {
         "PREFECT_HOME": str(_home(root)),
         "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
         "PREFECT_SERVER_UI_STATIC_DIRECTORY": str(_home(root) / "ui"),  # not in site-packages
@@ -49,15 +49,15 @@ def serve(root: Path, port: int = PORT) -> str:
     try:
         socket.create_server((HOST, port)).close()
     except (OSError, OverflowError) as error:
-        why = os.strerror(error.errno or 0) if isinstance(error, OSError) else error
-        raise UserError(f"--port {port}: cannot be used ({why}); give another one") from error
+        raise UserError(f"--port {port}: cannot be used, give another one: {error}") from error
     url = f"http://{HOST}:{port}"
     _home(root).mkdir(exist_ok=True)
-    write_text(_home(root) / "address", url)
-    command = ["-P", "-m", "prefect", "server", "start", "--host", HOST, "--port", str(port)]
-    settings = environment(root) | {"PREFECT_UI_API_URL": f"{url}/api"}
+    (_home(root) / "address").write_text(url, encoding="utf-8")
     print(f"Prefect UI: {url} (Ctrl-C ends it)", file=sys.stderr, flush=True)
-    os.execve(sys.executable, [sys.executable, *command], settings)
+    configure(root)
+    os.environ["PREFECT_UI_API_URL"] = f"{url}/api"
+    command = ["-P", "-m", "prefect", "server", "start", "--host", HOST, "--port", str(port)]
+    os.execv(sys.executable, [sys.executable, *command])
 
 
 def address(root: Path) -> str | None:

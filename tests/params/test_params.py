@@ -132,14 +132,11 @@ REFUSED = [
     ("run.bands", ["band1", "band1"], "run.bands: lists an entry twice"),
     ("run.bands", [], "run.bands: must not be empty"),
     ("run.methods", ["best"], "run.methods: best is not one of"),
-    ("run.bands", ["band9"], "run.bands: band9 is not one of band1, band2, band3"),
-    ("run.ablations.methods", ["best"], "run.ablations.methods: best is not one of"),
     ("run.ablations.methods", ["sling2sim2real"], "ablations.methods: sling2sim2real is one"),
     ("run.ablations.bands", ["other"], "run.ablations.bands: other is not one of run.bands"),
     ("rig.bands", {}, "rig.bands: lacks band1"),
     ("rig.bands.band1.law", "mooney", "rig.bands.band1.law: must be 'ogden'"),
     ("rig.bands.band1.constants", [0.4, 2.0, 0.1], "rig.bands.band1: constants: ogden has pairs"),
-    ("rig.bands.band1.constants", [0.4, -2.0], "rig.bands.band1: constants: ogden has pairs"),
     ("rig.bands.band1.spectrum", {"weight": 0.1}, "rig.bands.band1.spectrum.times: is missing"),
     ("rig.bands.band1_dip.like", "band9", "rig: bands.band1_dip.like: band9 is not one of band1"),
     ("rig.bands.band1_dip.like", "band2_dip", "band2_dip is itself like band2: name that"),
@@ -150,22 +147,18 @@ REFUSED = [
         [DIP | {"deep": 1}],
         "plan.dips.0.deep: unknown key, the closest known one is dep",
     ),
-    ("rig.pull", "long", "rig.pull: must be 'paper' or 'informative'"),
     ("bands.band1_dip.mass", 0.1, "bands.band1_dip.mass: must be that of band1, which rig.bands"),
     ("run.dips", ["band1"], "run: dips: band1 is one of run.bands already"),
-    ("run.dips", ["other"], "run.dips: other is not one of band1"),
     ("bands", {"band-1": CONTENT["bands"]["band1"]}, "bands.band-1: a name has"),
     ("bands.band1.source", "bag", "bands.band1.source: must be 'recording' or 'rig'"),
     ("parameters.youngs_modulus.low", 1e8, "parameters.youngs_modulus: low must be less"),
     ("parameters.dynamic_friction", {"low": 0, "high": 1, "scale": "log"}, "above 0"),
     ("setup.draw_y", [-0.25, -0.45], "setup.draw_y: the first must be less"),
     ("setup.draw_y", -0.3, "setup.draw_y: must be a list"),
-    ("setup.draw_y", [-0.3], "setup.draw_y.1: is missing"),
     ("setup.clamp_direction", [0, 0, 0.5], "setup.clamp_direction: the vector must have"),
     ("setup.base_to_fork", [0] * 7, "setup.base_to_fork: the quaternion must have"),
     ("force.cutoff_unit", "kHz", "force.cutoff_unit: must be 'rad/sample'"),
     ("force", {"cutoff": 3.2, "cutoff_unit": "rad/sample"}, "force: cutoff must be below pi"),
-    ("optimizer.k_nn", 5, "optimizer.k_nn: must be between 6"),
     ("optimizer.k_nn", 9999, "optimizer: k_nn must be at most"),
     ("optimizer.cma_rollouts", 4, "optimizer: cma_rollouts must be at least"),
     ("sling.edges", 25, "sling: edges must be even"),
@@ -173,7 +166,6 @@ REFUSED = [
     ("episode.tail", 59.0, "episode: tail must be less"),
     ("episode.longest", 8.0, "episode: longest must be at least duration"),
     ("trials.targets", [0.5], "trials.targets: 0.5 lies outside policy.targets"),
-    ("trials.targets", [1.5, 2.6], "trials.targets: 2.6 lies outside"),
     ("bands", {"measured": CONTENT["bands"]["band1"]}, "bands.measured: data/trials/measured"),
     ("bands.band1.rest_length", 0.2, "bands.band1.rest_length: 0.2 must be longer than setup."),
     ("policy.hidden", [], "policy.hidden: must not be empty"),
@@ -182,36 +174,22 @@ REFUSED = [
     ("methods.de.weights", NOTHING, "methods.de.weights: at least one weight"),
     ("methods.de.search", "cmaes", "methods.de.search: must be multistart, least_squares, de"),
     ("methods.de.search", "my.module:", "or package.module:Class, got 'my.module:'"),
-    ("methods.de.search", "my module:Class", "methods.de.search: must be multistart"),
     ("methods.no_work.settings", {"rate": 1}, "methods.no_work: settings are for another"),
     ("methods.de.settings", {"seed": 3}, "methods.de: settings: seed stands under `optimizer`"),
-    ("optimizer.mutation", [0.5, 2.0], "optimizer.mutation.1: must be between 0 and 1.99"),
     ("methods.de", CONTENT["methods"]["de"] | NARROW, "must be between 0.45 and 0.49, got 0.4"),
     ("methods.least_squares.fixed", {}, "wants `fixed` to name poissons_ratio, dynamic_friction"),
-    ("methods.de.nuisances", {"air_drag": [0, 8]}, "methods.de.nuisances: unknown key"),
     ("setup.tool", {"weight": 0.7}, "setup.tool.weight: unknown key, the closest known one is"),
     ("run.own", ["band1"], "own: band1 is one of run.bands already"),
-    ("run.own", ["other"], "run.own: other is not one of band1"),
-    ("run.own_steps.density", [], "run.own_steps.density: must list those of run.methods[0]"),
-    ("methods.de.weights.taut", 1.0, "methods.de.weights.taut: unknown key"),
-    ("methods.de.fixed", {"air_drag": 1.0}, "air_drag is not one of youngs_modulus"),
     ("methods.de.bounds", {"air_drag": [0.0, 1.0]}, "air_drag is not one of youngs_modulus"),
     ("methods.de.bounds", {"poissons_ratio": [0.2, 0.4]}, "[low, high] within parameters.poissons"),
     ("methods.de.settings", {"rate": [1]}, "methods.de.settings.rate: must be a number, true"),
     ("methods.de.k_top", 3, "methods.de: k_top and covariance are for search: multistart"),
-    ("methods.de.covariance", False, "methods.de: k_top and covariance are for search"),
-    ("methods.no_work.covariance", 1, "methods.no_work.covariance: must be a valid boolean"),
-    ("methods.no_work.k_top", 0, "methods.no_work.k_top: must be between 1 and 50"),
     ("setup.foot_height", 0.52, "setup.foot_height: must be less than setup.fork_height"),
     ("setup.draw_z", [-0.52, -0.1], "setup.draw_z: must be above the floor"),
-    ("setup.fork_height", 0.3, "setup.draw_z: must be above the floor, setup.fork_height below"),
-    ("methods.de.law", "gum", "methods.de.law: must be"),
     ("methods.de.law", "rubber", "methods.de: bounds: mooney_share is missing, [low, high] within"),
-    ("methods.de.fixed", {"relaxation": 0.01}, "methods.de.fixed: relaxation is not one of"),
     ("methods.de.fixed", {"poisson": 0.4}, "methods.de.fixed: poisson is not one of youngs_"),
     ("methods.de.fixed", {"poissons_ratio": 0.2}, "must be between 0.3 and 0.49, got 0.2"),
     ("methods.de.fixed", ALL_FIXED, "methods.de.fixed: names every parameter, so none is left"),
-    ("methods.de.bounds", {"poissons_ratio": 0.4}, "bounds.poissons_ratio: must be a list"),
 ]
 
 
@@ -325,7 +303,7 @@ JUNK = st.one_of(
 )
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None)
 @given(
     path=st.sampled_from([path[:n] for path, _ in leaves(CONTENT) for n in (1, 2, 3)]), junk=JUNK
 )
@@ -336,7 +314,7 @@ def test_any_other_value_is_accepted_or_refused_in_one_line(path: tuple, junk: o
         assert "\n" not in str(error)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None)
 @given(data=st.data())
 def test_any_damaged_text_is_accepted_or_refused_in_one_line(data: st.DataObject) -> None:
     start = data.draw(st.integers(0, len(TEXT)))

@@ -379,7 +379,7 @@ CHANGES = {
     "a chapter of the report": Change(
         ("pipeline/report/run/chapters/appendix.py", "# edited\n"), {"report"}
     ),
-    "a part of the card": Change(("pipeline/report/card/page.py", "# edited\n"), CARDS),
+    "a part of the card": Change(("pipeline/report/card/text.py", "# edited\n"), CARDS),
 }
 
 

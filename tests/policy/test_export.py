@@ -106,6 +106,7 @@ runpy.run_path("policy_elsewhere.py", run_name="__main__")
     assert "the arm may hold 30 N" in message and "draw in 4.0 s, wait 2.0 s" in message
 
 
+@pytest.mark.slow
 def test_equal_networks_give_equal_bytes(trained, folder, tmp_path) -> None:
     """In other processes, whose sets are in another order."""
     torch.save(trained.policy, tmp_path / "network.pickle")

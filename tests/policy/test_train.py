@@ -73,6 +73,7 @@ def error_of(trained: Trained) -> float:
     return float(np.abs(truth.landing_y - targets).mean())
 
 
+@pytest.mark.slow
 def test_on_simulated_launches_it_hits_without_a_map(toy_map, settings) -> None:
     """Each transition is one launch, and each deterministic check one for every target."""
     launched = []
@@ -89,6 +90,7 @@ def test_on_simulated_launches_it_hits_without_a_map(toy_map, settings) -> None:
     assert trained.failures.keys() == {TOO_MUCH_FORCE}
 
 
+@pytest.mark.slow
 def test_a_learned_exploration_narrows_by_itself(toy_map, settings) -> None:
     learned = SimpleNamespace(**{**vars(settings), "exploration": "learned"})
     trained = train(toy_map.surface, learned)

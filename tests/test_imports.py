@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
+import pytest
 from packaging.requirements import Requirement
 
 from pipeline.base.errors import OF_THE_EXTRA
@@ -184,6 +185,7 @@ def light(folder: Path, *words: str) -> subprocess.CompletedProcess:
     )
 
 
+@pytest.mark.slow
 def test_a_light_install_suffices_and_says_what_it_lacks(tmp_path: Path) -> None:
     brought = {name for package in OF_THE_EXTRA for name in distributions(package)}
     assert declared("run") <= brought

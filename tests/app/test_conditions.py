@@ -36,7 +36,6 @@ def project(tmp_path: Path) -> Path:
         "fit mine.mcap --mass 0.023",
         "observe --band band1 --draw=-0.30,-0.15 --landing 1.85",
         "setup --max-force 40",
-        "flow",
         "ui --port 43217",
     ],
 )

@@ -192,7 +192,7 @@ def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
     patch.setattr("app.flow.server.serve", summary)
     patch.setattr("validation.simulator.verification.verify", lambda _, device: summary(device))
     patch.setattr("validation.simulator.verification.summary", lambda done: (done, 0))
-    patch.setattr("pipeline.base.environment.environment", lambda *given: {"given": given})
+    patch.setattr("validation.environment.environment", lambda *given: {"given": given})
     patch.setattr(
         "validation.benchmarks.throughput.bench", lambda _, *what: {"bench": summary(*what)}
     )

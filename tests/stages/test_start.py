@@ -141,6 +141,7 @@ def test_a_stage_has_one_thread_of_blas_whatever_the_machine() -> None:
     assert done.stdout == "[1]\n", done.stderr
 
 
+@pytest.mark.slow
 def test_a_stage_imports_no_library_that_it_does_not_use() -> None:
     """Each costs seconds of a run's start: networks and meshes, plots, tables.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 from typing import NamedTuple
 
 import cv2
@@ -13,10 +12,7 @@ from PIL import Image
 
 FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "BMP", "JPEG2000", "AVIF")  # of what OpenCV unpacks
 KNOWN = "JPEG, PNG, WebP, TIFF, BMP, JPEG 2000 or AVIF"
-JPEG = b"\xff\xd8"
-MARKER = re.compile(rb"\xff+([^\x00\xd0-\xd7\xff])", re.DOTALL)  # but for those within a scan
-BARE = (0x01, 0xD8)  # markers without a length
-END = 0xD9
+JPEG_END = b"\xff\xd9"  # behind it is what a driver sends of its buffer
 LARGEST = 2**24  # pixels; a damaged size must not ask for more memory than this
 
 
@@ -60,8 +56,8 @@ def unpacked(data: np.ndarray, flags: int, kind: str) -> np.ndarray:
     (width, height), _, format = header(data)
     if width * height > LARGEST:
         raise Undecodable(f"an image of {width} x {height} pixels ({kind})")
-    if format == "JPEG":
-        data = data[: _jpeg_end(data.tobytes())]
+    if format == "JPEG" and JPEG_END not in data.tobytes():  # OpenCV may fill it up with grey
+        raise Undecodable(f"JPEG is cut off ({kind})")
     if format == "PNG":
         _expect_whole(data, kind)
     level = logging.setLogLevel(logging.LOG_LEVEL_SILENT)  # what it would say is said here
@@ -74,23 +70,6 @@ def unpacked(data: np.ndarray, flags: int, kind: str) -> np.ndarray:
     if image is None:
         raise Undecodable(f"damaged {format} ({kind})")
     return image
-
-
-def _jpeg_end(data: bytes) -> int:
-    """Where a JPEG ends: drivers send their whole buffer, with anything behind it.
-
-    Raises:
-        Undecodable: It has no end, and OpenCV would fill it up with grey.
-    """
-    at = len(JPEG)
-    while match := MARKER.search(data, at):
-        marker, at = match[1][0], match.end()
-        if marker == END:
-            return at
-        if marker in BARE:
-            continue
-        at += int.from_bytes(data[at : at + 2], "big")
-    raise Undecodable("JPEG is cut off")
 
 
 def _expect_whole(data: np.ndarray, kind: str) -> None:

@@ -85,6 +85,7 @@ def test_a_robot_that_follows_the_plan_makes_a_recording_that_check_accepts(reco
     assert report.signals.draw_m == pytest.approx([0, -0.4, 0], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_robot_that_pulls_twice_makes_two_recordings_in_one_file(recorded, tmp_path) -> None:
     from app.preflight.check import look_at
 

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from app.flow.disk import expect_writable
-from app.preflight.check import look_at
+from app.preflight.check import GivenBand, look_at
 from app.preflight.report import CheckReport
 from pipeline.base.errors import UserError, printable
 from pipeline.base.files import replacing, replacing_folder
@@ -79,7 +79,7 @@ def checked(
     """
     reports, made = [], {}
     for file in recordings:
-        look = look_at(file, params, params.bands[band])
+        look = look_at(file, params, GivenBand(params.bands[band]))
         reports.append(look.report)
         if not look.report.usable:
             raise UserError(f"{file}: {look.report.problem}")

@@ -64,7 +64,7 @@ ADDED = {
     "fit --name mine": "--mass 0.05, --diameter 0.011, --rest-length 0.5, --launches launches.csv,"
     " --json",
     ADD: "--diameter 0.011, --rest-length 0.5",
-    "check mine.mcap": "--band band2, --rest-length 0.5, --pull 2, --sheet sheet.txt,"
+    "check mine.mcap": "--band band2, --mass 0.05, --rest-length 0.5, --pull 2, --sheet sheet.txt,"
     " --rrd line.txt, --pictures data, --frames, --json",
     "check mine.mcap --band mine": "--diameter 0.02",
     "setup --max-force 25": "--left-tip=0.7,0.1375,0.42, --right-tip=0.7,-0.1375,0.42,"

@@ -78,7 +78,7 @@ def _says_nothing(schema: Schema) -> bool:
         return False
     if schema.encoding in ("", "omgidl"):  # of DDS, whose names of ROS types are as well known
         return True
-    return schema.encoding == "ros2msg" and standard.adds_nothing(schema.name, schema.data)
+    return schema.encoding == "ros2msg" and schema.data.strip() in (b"", schema.name.encode())
 
 
 def message_reader(decode: Decoder, read: Callable[[Message], Value]) -> Callable[[bytes], Value]:

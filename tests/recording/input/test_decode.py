@@ -159,7 +159,6 @@ def test_what_cannot_be_read_is_one_line_with_the_topic(
         (NAME, "", b""),
         (NAME, "ros2msg", b""),
         (NAME, "ros2msg", NAME.encode()),
-        (NAME, "ros2msg", MSG.split(LINE)[0].encode()),  # without the types within
         ("geometry_msgs::msg::dds_::WrenchStamped_", "omgidl", b"module geometry_msgs { };"),
     ],
 )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from app import arguments as kinds
 from app.command_line import JSON, REFUSED, Done, Refusal, command, execute, flag, parser, say
-from app.sizes import DIAMETER, REST_LENGTH
+from app.sizes import DIAMETER, REST_LENGTH, assumed
 from pipeline.base.layout import Layout
 from pipeline.export import ENGINES
 from stages.start import run
@@ -77,8 +77,8 @@ def fit(arguments: argparse.Namespace) -> Done:
     flag("name", help="what to call the band: small letters, digits and _"),
     flag("--recording", type=Path, required=True, nargs="+", metavar="FILE.mcap"),
     flag("--mass", required=True, **MASS),
-    flag("--diameter", default=DIAMETER, **THICK),
-    flag("--rest-length", default=REST_LENGTH, **LONG),
+    flag("--diameter", **THICK),
+    flag("--rest-length", **LONG),
 )
 def add_band(arguments: argparse.Namespace) -> Done:
     from app.preflight.add_band import add_band
@@ -108,9 +108,10 @@ def add_recording(arguments: argparse.Namespace) -> Done:
 
 @command(
     "say whether a recording can be used, what is missing and what costs accuracy",
-    "my.mcap --rest-length 0.52 --sheet my.png",
+    "my.mcap --mass 0.0408 --sheet my.png",
     flag("recording", type=Path, metavar="FILE.mcap", help="or a bag's folder"),
-    flag("--band", metavar="NAME", help="band of params.yaml, for its diameter and rest length"),
+    flag("--band", metavar="NAME", help="band of params.yaml, for its mass and sizes"),
+    flag("--mass", **MASS),
     flag("--diameter", **THICK),
     flag("--rest-length", **LONG),
     flag("--pull", type=kinds.count, metavar="N", help="which pull; default: the first usable one"),
@@ -134,6 +135,7 @@ def check(arguments: argparse.Namespace) -> Done:
         arguments.recording,
         load() if in_project else Settings.default(),
         band=arguments.band,
+        mass=arguments.mass,
         diameter=arguments.diameter,
         rest_length=arguments.rest_length,
         as_json=arguments.json,
@@ -203,6 +205,8 @@ def plan(arguments: argparse.Namespace) -> Done:
 
     sizes = arguments.mass, arguments.diameter, arguments.rest_length
     params, band = with_band(load(), arguments.band, *sizes)
+    if any(sizes) and (taken := assumed(*sizes[1:])):
+        say(f"assumed: {taken}")
     plan = plan_recording(
         params,
         band,

@@ -32,9 +32,9 @@ def verify(arguments: argparse.Namespace) -> Done:
     JSON,
 )
 def bench(arguments: argparse.Namespace) -> Done:
-    from pipeline.base.environment import environment
     from pipeline.params import load
     from validation.benchmarks import throughput
+    from validation.environment import environment
 
     device, law = arguments.device, arguments.law
     result = throughput.bench(load(), device, law)

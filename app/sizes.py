@@ -6,7 +6,8 @@ from pipeline.base.errors import UserError
 from pipeline.params import Params
 from pipeline.params.lab import BandParams
 
-MASS, DIAMETER, REST_LENGTH = 0.03, 0.010, 0.52  # kg, m: of a common band, where nothing is given
+DIAMETER, REST_LENGTH = 0.010, 0.52  # m: of a common band, where nothing is given
+MASS = 0.03  # kg: stands for what is not known, and nothing is judged by it
 
 
 def band_to_come(
@@ -28,3 +29,9 @@ def band_to_come(
             f" {params.setup.fork_width:g}"
         )
     return band
+
+
+def assumed(diameter: float | None, rest_length: float | None) -> str:
+    """Which sizes of a common band stand for those that are not given; "" where all are."""
+    sizes = (("--diameter", diameter, DIAMETER), ("--rest-length", rest_length, REST_LENGTH))
+    return " and ".join(f"{name} {usual:g}" for name, given, usual in sizes if given is None)

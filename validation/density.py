@@ -59,16 +59,14 @@ def calibrated_by(
     sling: ClampedBand,
     episodes: Sequence[Episode],
     observed: Sequence[Observed] = (),
-    devices: Sequence[str] = ("cpu",),
 ) -> tuple[Calibrated, dict]:
     """What a method finds, and says of it: least squares takes all, others the first.
 
-    Searches have their rollouts on `devices`, the fit of least squares on the CPU.
     Of another search than least squares it says "loss": the terms and the total of the best.
     """
     box = SearchBox.of_method(params, method)
     loss = EpisodeLoss.of(params, method, episodes[0], sling)
-    evaluate = Evaluator(episodes[0], sling, loss, box, workers=WORKERS, devices=devices)
+    evaluate = Evaluator(episodes[0], sling, loss, box, workers=WORKERS)
     history = posterior.recorded_history(sling, episodes)
     setup = LaunchSetup.of(params.setup, params.sling, history)
     evidence = Evidence(observed, setup)

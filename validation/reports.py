@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base.code import ROOT
-from pipeline.base.environment import environment
 from pipeline.base.files import write_json
+from validation.environment import environment
 
 
 def write_report(

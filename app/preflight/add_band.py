@@ -10,7 +10,7 @@ from ruamel.yaml.comments import CommentedMap
 
 from app.params_file import edited
 from app.preflight import recordings as files
-from app.sizes import DIAMETER, REST_LENGTH
+from app.sizes import DIAMETER, REST_LENGTH, assumed
 from pipeline.base.disk import expect_writable
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
@@ -25,8 +25,8 @@ def add_band(
     name: str,
     recordings: Sequence[Path],
     mass: float,
-    diameter: float = DIAMETER,
-    rest_length: float = REST_LENGTH,
+    diameter: float | None = None,
+    rest_length: float | None = None,
     root: Path | str = ".",
 ) -> str:
     """Check recordings, copy them to data/raw and add their band to params.yaml and to run.own.
@@ -38,8 +38,8 @@ def add_band(
         name: Of the band: small letters, digits and _.
         recordings: MCAP files, or bags' folders.
         mass: Of the band [kg].
-        diameter: Of its section [m].
-        rest_length: Between the clamps [m].
+        diameter: Of its section [m]; None, which is said: a common one.
+        rest_length: Between the clamps [m]; None as for the diameter.
         root: Folder of the project.
 
     Returns:
@@ -53,8 +53,9 @@ def add_band(
     path, layout = Path(root) / "params.yaml", Layout(Path(root))
     recordings = once(recordings)
     before = load(path)
-    sizes = {"mass": mass, "diameter": diameter, "rest_length": rest_length}
-    band = {"source": "recording", **sizes}
+    sizes = {"diameter": DIAMETER if diameter is None else diameter}
+    sizes["rest_length"] = REST_LENGTH if rest_length is None else rest_length
+    band = {"source": "recording", "mass": mass, **sizes}
     there_before = name in before.bands
     if there_before and before.bands[name].model_dump(include={*band}) != band:
         raise UserError(
@@ -82,7 +83,8 @@ def add_band(
     else:
         files.copy(new)
     write_text(path, text)
-    return files.summary(f"{name} added", reports)
+    done, taken = files.summary(f"{name} added", reports), assumed(diameter, rest_length)
+    return f"{done}\n  assumed: {taken}" if taken else done
 
 
 def _with_band(path: Path, name: str, band: dict[str, object]) -> str:

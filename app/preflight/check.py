@@ -15,7 +15,7 @@ from app.preflight.facts import (
     SignalSummary,
 )
 from app.preflight.report import CheckReport, Chosen, Topic
-from app.sizes import DIAMETER, MASS, REST_LENGTH, band_to_come
+from app.sizes import assumed, band_to_come
 from pipeline.base.errors import UserError
 from pipeline.episode.phases import phases_of_hand, unseen
 from pipeline.params import Params, expect_known
@@ -28,9 +28,6 @@ from pipeline.recording.input.bag import sha256
 from pipeline.recording.input.container import Container, read_container
 from pipeline.recording.input.reader import Recording, recording_of
 from pipeline.recording.pulls import Pull, pulls_of
-
-COMMON = BandParams(source="recording", mass=MASS, diameter=DIAMETER, rest_length=REST_LENGTH)
-ASSUMED = "assumed: give --band, or --diameter and --rest-length"
 
 
 @dataclass(frozen=True)
@@ -49,26 +46,38 @@ class Look:
     pulls: Sequence[Checked] = ()
 
 
+@dataclass(frozen=True)
+class GivenBand:
+    """A band as far as whoever checks its recording knows it: where it is from, and its mass."""
+
+    params: BandParams
+    source: str = "given"
+    weighed: bool = True
+
+    @property
+    def facts(self) -> BandFacts:
+        band = self.params
+        mass = float(band.mass) if self.weighed else None
+        return BandFacts(float(band.diameter), float(band.rest_length), self.source, mass)
+
+
 def look_at(
     path: Path,
     params: Params,
-    band: BandParams | None = None,
-    source: str = "given",
+    band: GivenBand,
     pull: int | None = None,
 ) -> Look:
     """Look at a recording as far as it can be read: the report, and what it was made from.
 
     Args:
         path: The MCAP file.
-        band: Of which diameter and rest_length count; a common one if None.
-        source: Where `band` is from.
+        band: With what is known of it.
         pull: Which of several; None for the first that can be used, if there is one.
 
     Raises:
         UserError: where there is no MCAP file to look at. Anything else is in the report.
     """
     container = read_container(Path(path))
-    band_params = band or COMMON
     report = CheckReport(
         path=str(path),
         sha256=sha256(path),
@@ -76,9 +85,7 @@ def look_at(
         losses=container.losses,
         notes=container.notes,
         topics=_topics(container),
-        band=BandFacts(
-            float(band_params.diameter), float(band_params.rest_length), source if band else ASSUMED
-        ),
+        band=band.facts,
     )
     recording = None
     try:
@@ -92,7 +99,7 @@ def look_at(
         return Look(report, recording)
     if pull is not None and pull > len(pulls):
         raise UserError(f"--pull {pull}: the last pull in {path} is number {len(pulls)}")
-    processed = [Checked.of(found_pull, band_params, params) for found_pull in pulls]
+    processed = [Checked.of(each, band.params, params, band.weighed) for each in pulls]
     looks = [_look_at_pull(replace(report), pull_checked) for pull_checked in processed]
     usable = [look for look in looks if look.report.usable]
     chosen = looks[pull - 1] if pull else (usable or looks)[0]
@@ -101,23 +108,26 @@ def look_at(
 
 
 def band_of(
-    params: Params, name: str | None, diameter: float | None, rest_length: float | None
-) -> tuple[BandParams | None, str]:
-    """The band that a command line names, None where it names none, and where it is from.
+    params: Params,
+    name: str | None = None,
+    mass: float | None = None,
+    diameter: float | None = None,
+    rest_length: float | None = None,
+) -> GivenBand:
+    """The band that a command line names, or one of the sizes that it gives.
 
     Raises:
         UserError: about a name that is not known, or a band that does not reach across the fork.
     """
-    if name is not None and (diameter or rest_length):
-        raise UserError("--band brings its diameter and rest length: leave the other two out")
     if name is not None:
+        if mass or diameter or rest_length:
+            raise UserError("--band brings its mass, diameter and rest length: leave these out")
         expect_known(params, "band", name, called="--band")
-        return params.bands[name], f"bands.{name} of params.yaml"
-    if diameter is None and rest_length is None:
-        return None, ASSUMED
-    band = band_to_come(params, None, diameter, rest_length)
-    left = [n for n, v in (("--diameter", diameter), ("--rest-length", rest_length)) if v is None]
-    return band, f"given, but assumed: {left[0]}" if left else "given"
+        return GivenBand(params.bands[name], f"bands.{name} of params.yaml")
+    taken = assumed(diameter, rest_length)
+    source = f"assumed: {taken}; give yours, or --band" if taken else "given"
+    band = band_to_come(params, mass, diameter, rest_length)
+    return GivenBand(band, source, weighed=mass is not None)
 
 
 def _look_at_pull(report: CheckReport, done: Checked) -> Look:

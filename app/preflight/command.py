@@ -15,6 +15,7 @@ def check(
     params: Params,
     *,
     band: str | None = None,
+    mass: float | None = None,
     diameter: float | None = None,
     rest_length: float | None = None,
     as_json: bool = False,
@@ -30,7 +31,7 @@ def check(
         recording: The MCAP file.
         params: The whole params.
         band: One of params.bands.
-        diameter, rest_length: Of a band that is not there yet [m].
+        mass, diameter, rest_length: Of a band that is not there yet [kg, m].
         as_json: The report as JSON, with what was drawn under `written`.
         frames: There, a row a picture under `coverage`.
         sheet, rrd: Files to write.
@@ -49,8 +50,7 @@ def check(
         expect_writable(rrd, ".rrd")
     if pictures:
         expect_new(pictures)
-    band_params, source = band_of(params, band, diameter, rest_length)
-    look = look_at(recording, params, band_params, source, pull)
+    look = look_at(recording, params, band_of(params, band, mass, diameter, rest_length), pull)
     if sheet:
         from app.preflight.sheet import draw_sheet
 

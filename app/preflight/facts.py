@@ -15,11 +15,12 @@ from pipeline.recording.tips import Tips
 
 @dataclass(frozen=True)
 class BandFacts:
-    """The band that a recording was read with, and where that comes from."""
+    """The band that a recording was read with, and where that comes from; no mass: not known."""
 
     diameter_m: float
     rest_length_m: float
     source: str
+    mass_kg: float | None
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from app.preflight.check import look_at
+from app.preflight.check import GivenBand, look_at
 from app.preflight.report import CheckReport
 from pipeline.base.disk import expect_writable
 from pipeline.base.errors import UserError, printable
@@ -79,7 +79,7 @@ def checked(
     """
     reports, made = [], {}
     for file in recordings:
-        look = look_at(file, params, params.bands[band])
+        look = look_at(file, params, GivenBand(params.bands[band]))
         reports.append(look.report)
         if not look.report.usable:
             raise UserError(f"{file}: {look.report.problem}")

@@ -164,7 +164,11 @@ class CheckReport:
         content = asdict(self)
         for title in ("band", "signals", "cloud", "frames"):
             if facts := content[title]:
-                lines += ["", title, *(f"  {k:<22}{_shown(v)}" for k, v in facts.items())]
+                lines += [
+                    "",
+                    title,
+                    *(f"  {k:<22}{_shown(v)}" for k, v in facts.items() if v is not None),
+                ]
         return "\n".join(map(printable, [*lines, "", *_topics(self.topics)]))
 
     def _basis(self) -> list[str]:
@@ -190,6 +194,10 @@ class CheckReport:
                 f"  the band: {self.band.diameter_m:g} m thick and"
                 f" {self.band.rest_length_m:g} m long, {self.band.source}"
             ]
+        if self.band.mass_kg is None:
+            lines.append(
+                "  no mass given, so its weight and the force's direction are not judged: --mass"
+            )
         return ["", "it rests on", *lines] if lines else []
 
     def _verdict(self) -> list[str]:

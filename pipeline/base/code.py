@@ -1,4 +1,4 @@
-"""What code a result depends on: the folders that a script imports, and a digest of a folder.
+"""What code a result depends on: the folders that a script imports.
 
 Python's imports are followed at any depth and inside functions too. `tools/closure.py` writes them
 into dvc.yaml.
@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import ast
 from pathlib import Path
-
-from pipeline.base.fingerprint import fingerprint
 
 ROOT = Path(__file__).parents[2]
 CODE = ("pipeline/", "rig/", "stages/", "app/", "sling2sim2real/", "validation/")
@@ -84,12 +82,3 @@ def concern(file: str) -> str:
         return file
     top = max((name for name in NESTED if file.startswith(name)), key=len, default="")
     return "/".join(file.split("/")[: top.count("/") + 1 if top else 2])
-
-
-def digest(part: Path) -> str | None:
-    """Digest of a file, or of a folder with all below it; None where there is none of that name."""
-    if not part.exists():
-        return None
-    if part.is_file():
-        return fingerprint(part)[:12]
-    return fingerprint(part, *sorted(path for path in part.rglob("*") if path.is_dir()))[:12]

@@ -55,12 +55,11 @@ def expect_writable(*paths: Path) -> None:
 
 def expect_ready(root: Path) -> None:
     """Have DVC work in a project. Raises UserError where stages could not write what they make."""
-    if not ((root / ".dvc").is_dir() and (root / "dvc.yaml").is_file()):
-        raise UserError(f"{root}: no dvc.yaml and .dvc/ here; run it in the project's folder")
     written = [path for pattern in WRITTEN for path in sorted(root.glob(pattern))]
     expect_writable(root, root / ".dvc" / "tmp", *written)
     expect_room(root)
     folders = (root.resolve(), *root.resolve().parents)
-    if not any((folder / ".git").exists() for folder in folders):  # it was unpacked from a ZIP
+    with_git = any((folder / ".git").exists() for folder in folders)
+    if (root / ".dvc").is_dir() and not with_git:  # it was unpacked from a ZIP
         without_git = ("config", "--local", "core.no_scm", "true")
         subprocess.run([sys.executable, "-P", "-m", "dvc", *without_git], cwd=root, check=True)

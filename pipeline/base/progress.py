@@ -67,38 +67,28 @@ class Progress:
         """
         self.title, self.total, self.unit, self.every = title, total, unit, every
         self.log = log or Path("logs", f"{title}.log")
-        self.done = 0
-        self._seconds = 0.0  # in all
-        self._new, self._lasted = 0, 0.0  # since the last line
-        self._called, self._told = time.monotonic(), -every
+        self.done = self._said = 0  # units; those of the last line
+        self._begun = self._spoke = time.monotonic()
         self.log.parent.mkdir(parents=True, exist_ok=True)
         self._write(time.strftime(f"%Y-%m-%d %H:%M:%S {title}: {total} {unit}"))
 
-    def advance(self, count: int, *facts: str, seconds: float | None = None) -> None:
-        """Tell of `count` more units.
-
-        Args:
-            facts: What there is to say of them.
-            seconds: What they took; default since the last call.
-        """
+    def advance(self, count: int, *facts: str) -> None:
+        """Tell of `count` more units, and `facts` of them."""
         now = time.monotonic()
-        seconds = now - self._called if seconds is None else seconds
-        self._called = now
-        self.done, self._seconds = self.done + count, self._seconds + seconds
-        self._new, self._lasted = self._new + count, self._lasted + seconds
-        if now - self._told < self.every and self.done < self.total:
+        self.done += count
+        if self._said and now - self._spoke < self.every and self.done < self.total:
             return
-        rate = f"{self._new / self._lasted:.1f} {self.unit}/s"
-        self._told, self._new, self._lasted = now, 0, 0.0
+        rate = f"{(self.done - self._said) / (now - self._spoke):.1f} {self.unit}/s"
+        self._said, self._spoke = self.done, now
         self._tell(
-            Step(self.title, self.done, self.total, self.unit, (*facts, rate, *self._left()))
+            Step(self.title, self.done, self.total, self.unit, (*facts, rate, *self._left(now)))
         )
 
-    def _left(self) -> list[str]:
+    def _left(self, now: float) -> list[str]:
         """Time left, at the mean rate."""
         if self.done >= self.total:
             return []
-        left = round((self.total - self.done) * self._seconds / self.done)
+        left = round((self.total - self.done) * (now - self._begun) / self.done)
         hours, minutes, seconds = left // 3600, left // 60 % 60, left % 60
         return [
             f"{hours}:{minutes:02}:{seconds:02} left" if hours else f"{minutes}:{seconds:02} left"

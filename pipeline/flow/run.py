@@ -48,6 +48,8 @@ def run(
         UserError: A stage failed, with counts and what failed; or why nothing could run.
     """
     start = time.monotonic()
+    if not ((root / ".dvc").is_dir() and (root / "dvc.yaml").is_file()):
+        raise UserError(f"{root}: no dvc.yaml and .dvc/ here; run it in the project's folder")
     expect_ready(root)
     graph = dvc.stale(root, targets)
     if not graph:

@@ -105,7 +105,6 @@ class BandParams(Section):
 class Topics(Section):
     wrench: str | None
     pose: str | None
-    twist: str | None
     gripper: str | None
     color: str | None
     depth: str | None
@@ -141,7 +140,6 @@ class SetupParams(Section):
     camera_to_fork: Pose | None
     urdf: FileName | None
     tip_link: str | None
-    start_pose: Pose | None
     tool: Tool | None
     topics: Topics
 

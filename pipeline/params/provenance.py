@@ -13,8 +13,7 @@ from typing import Any
 from pipeline.params import Params
 
 RECORDING = ("force", "cloud", "episode")  # whole sections
-RECORDED_SETUP = ("base_to_fork", "camera_to_fork", "start_pose", "tip_link", "tool", "topics")
-RECORDED_SETUP += ("urdf",)
+RECORDED_SETUP = ("base_to_fork", "camera_to_fork", "tip_link", "tool", "topics", "urdf")
 PULL_SETUP = ("air_density", "clamp_direction", "finger_opening_time", "fork_width", "grip_force")
 LAUNCH_SETUP = ("arm_stiffness", "foot_height", "fork_height", "projectile_mass")
 POLICY_SETUP = ("draw_y", "draw_z", "max_force")

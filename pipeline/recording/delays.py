@@ -100,7 +100,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Delays:
-    """Delays of pose (and twist) and of the camera's two topics; the tool that showed the pose's.
+    """Delays of the pose and of the camera's two topics; the tool that showed the pose's.
 
     Attributes:
         tool_inertia: Its `delay` is what `pose` leaves of it, 0 where no more than its error.

@@ -34,7 +34,7 @@ class Hold:
         angles, errors: Of both, with standard deviations [rad], shape (2,).
         modulus: Young's modulus that a rubber would have [Pa].
         weight: Of the slack band on the hand, over the whole band's weight; None where the
-            recording has no time for it.
+            recording has no time for it, or the band was not weighed.
         weight_error: Its standard deviation.
     """
 
@@ -49,9 +49,12 @@ class Hold:
 
 
 def hold_of(done: Processed) -> Hold:
-    """Measure the hold of a pull whose band is drawn at the release."""
+    """Measure the hold of a pull whose band is drawn at the release.
+
+    A band that was not weighed weighs nothing, which its stiffness hardly feels.
+    """
     signals, scene, facts = done.signals, done.scene, done.signals.facts
-    half = done.band.mass * GRAVITY / 2
+    half = (done.band.mass if done.weighed else 0.0) * GRAVITY / 2
     hand = signals.hand(signals.release_time - 0.01)
     force = np.array(facts.hold_force) - half
     size = float(np.linalg.norm(force))
@@ -107,7 +110,7 @@ def _weight(done: Processed, zero: float) -> tuple[float | None, float]:
     way = np.array([done.scene.stretch(time) for time in times])
     slack = (times > signals.grasp_time + AFTER_GRASP) & (times < signals.release_time)
     slack &= way < SLACK
-    if slack.sum() < LEAST_SLACK:
+    if slack.sum() < LEAST_SLACK or not done.weighed:
         return None, np.inf
     heavy = done.band.mass * float(np.linalg.norm(GRAVITY))
     force = signals.force[slack, 2]

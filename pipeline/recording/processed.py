@@ -27,17 +27,19 @@ class Processed:
 
     Attributes:
         pull: With the stamps corrected by `delays`.
+        weighed: Whether the band's mass is known: without it nothing is judged by the weight.
     """
 
     pull: Pull
     delays: Delays
     band: BandParams
     params: Params
+    weighed: bool = True
 
     @classmethod
-    def of(cls, pull: Pull, band: BandParams, params: Params) -> Self:
+    def of(cls, pull: Pull, band: BandParams, params: Params, weighed: bool = True) -> Self:
         """Correct the delays of its streams. Raises UserError."""
-        return cls(*correct_delays(pull, params), band, params)
+        return cls(*correct_delays(pull, params), band, params, weighed)
 
     @cached_property
     def signals(self) -> Signals:

@@ -59,7 +59,6 @@ class SignalFacts:
         slips: Sudden drops of the held force before the release, since the window's start [s].
         jumps: Those of the free hand before the grasp, that are not in `zeroed` [s].
         velocity_window: Of the fits that differentiate the path [s].
-        twist_difference: Median difference of speed to a recorded twist [m/s]; None without one.
     """
 
     bias: list[float]
@@ -85,7 +84,6 @@ class SignalFacts:
     slips: list[float]
     jumps: list[float]
     velocity_window: float
-    twist_difference: float | None
 
 
 @dataclass(frozen=True)
@@ -193,7 +191,6 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
         ],
         jumps=[time - start for time in release.slips if time < grasp - MARGIN],
         velocity_window=VELOCITY_WINDOW,
-        twist_difference=_twist_difference(pull, pose_grid, velocity),
     )
     return Signals(
         origin=recording.origin + round(start * 1e9),
@@ -261,16 +258,3 @@ def _lets_back(motion: Motion, time: float) -> bool:
 
 def _tool_facts(tool: Tool | ToolInertia | None, source: str) -> ToolFacts | None:
     return tool and ToolFacts(tool.mass, list(tool.center), source)
-
-
-def _twist_difference(pull: Pull, times: np.ndarray, velocity: np.ndarray) -> float | None:
-    """Median difference of speed to a recorded twist [m/s], in whatever frame that is given.
-
-    The derivative of the pose is used all the same: a robot filters its twist, nobody says how.
-    """
-    twist = pull.recording.twist
-    if twist is None or twist.topic == pull.recording.pose.topic:
-        return None
-    reported = np.linalg.norm(twist.values[:, :3], axis=1)
-    speed = np.interp(twist.seconds(pull.recording.origin), times, np.linalg.norm(velocity, axis=1))
-    return float(np.median(np.abs(reported - speed)))

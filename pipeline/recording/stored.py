@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from pipeline.base.code import digest
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder
 from pipeline.base.fingerprint import fingerprint
@@ -66,7 +65,7 @@ def _folder(path: Path, band: str, params: Params, layout: Layout) -> Path:
     key = fingerprint(
         path.name,
         sha256(path),
-        *(digest(source) or "" for source in SOURCES),
+        *SOURCES,
         *(section.model_dump_json() for section in sections),
         *([Path(params.setup.urdf)] if params.setup.urdf else []),
         *(f"{package} {version(package)}" for package in PACKAGES),

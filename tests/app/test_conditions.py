@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from dvc.config import Config
 
-from app.flow.disk import expect_ready
+from pipeline.base.disk import expect_ready
 from pipeline.base.errors import UserError
 from tests.project import DEFAULTS, ROOT, python
 from validation.projects import SLING, environment
@@ -36,7 +36,6 @@ def project(tmp_path: Path) -> Path:
         "fit mine.mcap --mass 0.023",
         "observe --band band1 --draw=-0.30,-0.15 --landing 1.85",
         "setup --max-force 40",
-        "flow",
         "ui --port 43217",
     ],
 )

@@ -9,6 +9,7 @@ from app.preflight.add_band import _with_band
 from tests.project import BAND, python
 from validation.projects import ProjectCopy, copy_project, run_of
 
+pytestmark = pytest.mark.slow
 RUN = ("dvc", "exp", "run")
 STATUS = ("git", "status", "--porcelain", "-uall")
 

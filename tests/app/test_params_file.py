@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from dvc.utils.hydra import apply_overrides
 from hypothesis import given
 from hypothesis import strategies as st
@@ -91,6 +92,7 @@ def test_a_text_over_several_lines_keeps_its_blank_ones() -> None:
 NAMES = st.lists(st.from_regex(r"[a-z][a-z0-9_]{0,30}", fullmatch=True), max_size=8, unique=True)
 
 
+@pytest.mark.slow
 @given(names=NAMES, mass=st.floats(1e-4, 1), retained=st.integers(0, 8), k_top=st.integers(1, 50))
 def test_whatever_is_changed_dvc_moves_no_line(
     tmp_path_factory, names, mass, retained, k_top

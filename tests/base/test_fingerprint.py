@@ -6,10 +6,11 @@ from pipeline.base.fingerprint import fingerprint
 
 
 def test_it_covers_contents_and_sources(tmp_path: Path) -> None:
-    data, source = tmp_path / "data.parquet", tmp_path / "code" / "solver.h"
-    source.parent.mkdir()
+    """Sources of a folder at any depth."""
+    data, source = tmp_path / "data.parquet", tmp_path / "code" / "deep" / "solver.h"
+    source.parent.mkdir(parents=True)
     data.write_text("1"), source.write_text("2")
-    parts = (data, source.parent)
+    parts = (data, tmp_path / "code")
     stamps = [fingerprint("params", *parts), fingerprint("params", *parts)]
     assert stamps[0] == stamps.pop()
     stamps.append(fingerprint("other", *parts))

@@ -1,5 +1,7 @@
 """The guard around Warp, which is not made for several threads at its start, and its compiler."""
 
+import pytest
+
 from tests.project import python
 
 STARTED_TWICE = """
@@ -64,6 +66,7 @@ def test_a_start_without_a_cuda_driver_is_silent_and_hides_nothing_else() -> Non
     assert (done.stdout, done.stderr) == ("", "something else\n")
 
 
+@pytest.mark.slow
 def test_results_are_the_same_on_every_x86_64_cpu() -> None:
     """With this one's vectors, and with the least that there are, without a fused multiply-add."""
     targets = ("-march=native", "-target-cpu x86-64-v2")

@@ -44,7 +44,8 @@ def test_a_line_says_rate_and_time_left(clock, capsys: pytest.CaptureFixture) ->
 
 def test_hours_left_have_minutes(clock, capsys: pytest.CaptureFixture) -> None:
     summary = Progress("x", 1000, "rollouts")
-    summary.advance(1, seconds=10.0)
+    clock.now += 10.0
+    summary.advance(1)
     assert capsys.readouterr().err.endswith("2:46:30 left\n")
 
 
@@ -61,7 +62,9 @@ def test_lines_are_told_no_more_often_than_asked_but_the_last_is(clock, capsys) 
 def test_a_terminal_has_a_bar(clock, capsys, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     summary = Progress("x", 2, "rollouts")
-    summary.advance(1, seconds=1.0), summary.advance(1, seconds=1.0)
+    for _ in range(2):
+        clock.now += 1.0
+        summary.advance(1)
     half, whole = capsys.readouterr().err.split("\r")[1:]
     assert half.startswith(f"x [{'#' * 15}{'-' * 15}] 1/2 rollouts") and "\n" not in half
     assert whole.startswith(f"x [{'#' * 30}] 2/2 rollouts") and whole.endswith("\n")

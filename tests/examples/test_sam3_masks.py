@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.examples.tiny_sam3 import save_tiny_sam3
 from tests.project import ROOT, python
-from validation.recordings.tiny_sam3 import save_tiny_sam3
 
 pytest.importorskip("transformers", reason="sam3 is an extra")
 SCRIPT = ROOT / "examples/sam3_masks.py"

@@ -72,6 +72,7 @@ def test_drawn_it_pulls_as_its_springs_and_hanging_it_is_slack(chain) -> None:
     assert np.abs(replay.data.qvel).max() < 1e-2
 
 
+@pytest.mark.slow
 def test_equal_bands_give_equal_bytes(model, done, tmp_path) -> None:
     again = export(model, "mjcf", tmp_path / "again")
     for file in done.folder.iterdir():

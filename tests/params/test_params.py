@@ -4,7 +4,7 @@ import copy
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
@@ -325,7 +325,6 @@ JUNK = st.one_of(
 )
 
 
-@settings(deadline=None, max_examples=200)
 @given(
     path=st.sampled_from([path[:n] for path, _ in leaves(CONTENT) for n in (1, 2, 3)]), junk=JUNK
 )
@@ -336,7 +335,6 @@ def test_any_other_value_is_accepted_or_refused_in_one_line(path: tuple, junk: o
         assert "\n" not in str(error)
 
 
-@settings(deadline=None, max_examples=200)
 @given(data=st.data())
 def test_any_damaged_text_is_accepted_or_refused_in_one_line(data: st.DataObject) -> None:
     start = data.draw(st.integers(0, len(TEXT)))

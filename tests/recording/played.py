@@ -82,7 +82,6 @@ class Played:
             wrench=stream("/ft/wrench", t, wrench),
             pose=stream("/arm/pose", u, np.hstack([place, quats])),
             gripper=stream("/gripper", v, fingers[:, None]),
-            twist=None,
         )
 
     def geometry(self) -> Geometry:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -101,7 +101,6 @@ def placed(edges: dict, **given):
     return geometry_of(bag, SimpleNamespace(**(vars(SETUP) | given)))
 
 
-@settings(deadline=None, max_examples=150)
 @given(fork=POSES, camera=POSES)
 def test_any_two_of_base_camera_and_fork_give_the_third(fork, camera) -> None:
     """In params or in /tf_static, each way round; held against matrices and their inverses."""

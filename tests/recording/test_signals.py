@@ -193,19 +193,6 @@ def test_irregular_stamps_give_the_same_velocity(params) -> None:
     np.testing.assert_allclose(jittered.velocity, even.velocity, atol=0.03)
 
 
-def test_a_recorded_twist_is_compared(params) -> None:
-    played = Played()
-    recording = played.recording()
-    assert signals(played, params, recording=recording).facts.twist_difference is None
-    t = np.arange(0, played.truth.end, 0.01)
-    speed = (played.hand(t + 1e-4) - played.hand(t - 1e-4)) / 2e-4
-    for factor, size in ((1.0, 0.002), (1.5, None)):
-        twist = np.hstack([factor * speed, np.zeros((len(t), 3))])
-        recording.twist = stream("/arm/twist", t, twist)
-        message = signals(played, params, recording=recording).facts.twist_difference
-        assert message < size if size else message > 0.02
-
-
 @pytest.mark.parametrize("topic", ["wrench", "pose"])
 def test_a_stamp_of_another_century_is_refused(topic, params) -> None:
     """And not filled in at 1 kHz."""

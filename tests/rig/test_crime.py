@@ -35,6 +35,7 @@ def quick(coarse):
     return with_(with_(coarse, "optimizer", **budget), "sling", **ROUGH)
 
 
+@pytest.mark.slow
 def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorded) -> None:
     """The same motion, noise, search and budget; clouds of the true band, without a camera's flaws.
 

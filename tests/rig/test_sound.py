@@ -1,8 +1,11 @@
 """A recording of the rig is sound."""
 
+import pytest
+
 from pipeline.recording.build import process
 
 
+@pytest.mark.slow
 def test_no_check_fires_on_the_rig(recorded, coarse) -> None:
     """Its small pictures apart, which show less of the band."""
     findings = process(recorded[0], coarse.bands["band1"], coarse).findings

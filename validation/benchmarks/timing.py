@@ -21,13 +21,6 @@ EVERY = 1.0  # s between two looks at the memory
 REPEATS = 3  # the best of them counts: others may use the machine too
 
 
-def timed(work: Callable[[], object]) -> tuple:
-    """What `work` returns, and its CPU and wall time [s]."""
-    cpu, wall = time.process_time(), time.perf_counter()
-    result = work()
-    return result, time.process_time() - cpu, time.perf_counter() - wall
-
-
 def busy() -> float:
     """Seconds that this machine's cores have worked, for whomever."""
     spent = psutil.cpu_times()
@@ -45,8 +38,13 @@ def others_share(before: float, cpu: float, wall: float) -> float:
 
 
 def seconds(run: Callable[[], object], repeats: int = REPEATS) -> float:
-    """The best of some runs."""
-    return min(timed(run)[2] for _ in range(repeats))
+    """Wall time of the best of some runs."""
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - start)
+    return min(times)
 
 
 def shared(devices: Sequence[str], simulate: Callable, parameters: Parameters, **options) -> list:

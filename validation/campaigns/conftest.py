@@ -8,9 +8,9 @@ from collections.abc import Callable
 import pytest
 
 from pipeline.base.code import ROOT
-from pipeline.base.environment import environment
 from pipeline.base.files import write_json
 from pipeline.params import Params, load
+from validation.environment import environment
 from validation.projects import DEFAULTS
 from validation.reports import plain
 

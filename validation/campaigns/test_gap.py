@@ -5,15 +5,12 @@ finds: the oracle's θ and draws live in this campaign alone.
 """
 
 from dataclasses import replace
-from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from pipeline.base.code import ROOT
 from pipeline.base.files import write_json
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.results.theta import load_theta, parameters_of
@@ -21,7 +18,6 @@ from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
 from pipeline.params import Params, load
 from pipeline.params.identification import STEPS
-from pipeline.report.drawing.styles import COLORS, INK, THEME
 from pipeline.simulator.parameters import EXTRA
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
@@ -173,38 +169,6 @@ def band_figures(params: Params, run: ProjectCopy, band: str, progress) -> dict:
     return result
 
 
-def draw_figure(figures: dict, path: Path) -> None:
-    """Errors with one thing perfect beside the floor, and what each landing's bias is made of."""
-    kinds = (AS_IT_IS, THETA_, AIMED, HIT)
-    with plt.rc_context(THEME):
-        size = 3.6 * len(figures), 5.6
-        figure, axes = plt.subplots(2, len(figures), figsize=size, squeeze=False)
-        for (band, content), (above, below) in zip(figures.items(), axes.T, strict=True):
-            for number, (method, of) in enumerate(content["methods"].items()):
-                place = np.arange(len(kinds)) + 0.38 * (number - 0.5)
-                error, clean = (
-                    [100 * of["variants"][kind][name] for kind in kinds]
-                    for name in ("mean_error_m", "without_noise_m")
-                )
-                above.bar(place, error, 0.36, color=COLORS[number], label=method)
-                above.plot(place, clean, "_", color=INK, ms=12)
-                targets = [float(target) for target in of["variants"][AS_IT_IS]["targets"]]
-                for mark, (name, part) in zip("os^", of["bias_parts_m"].items(), strict=True):
-                    look = {"color": COLORS[number], "marker": mark, "lw": 0.8}
-                    below.plot(targets, 100 * np.array(part), **look, label=f"{name}, {method}")
-            floor = 100 * content["floor"]["mean_error_m"]
-            above.axhline(floor, color=INK, lw=0.8)
-            above.axhline(FACTOR * floor, color=INK, lw=0.8, ls="--")
-            above.set(title=band, ylabel="|landing − target| [cm]")
-            above.set_xticks(range(len(kinds)), kinds, fontsize=7)
-            below.axhline(0, color=INK, lw=0.8)
-            below.set(xlabel="target [m]", ylabel="part of the bias [cm]")
-        handles, labels = axes[1, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=7)
-        figure.savefig(path, dpi=130)
-        plt.close(figure)
-
-
 def test_what_the_error_of_a_landing_is_made_of(tmp_path, progress, record) -> None:
     run, figures = copy_of_the_project(tmp_path / "project"), {}
     params = load(run.folder / "params.yaml")
@@ -215,7 +179,6 @@ def test_what_the_error_of_a_landing_is_made_of(tmp_path, progress, record) -> N
             for stage in (*STEPS[params.methods[method].search], "theta", "policy"):
                 run("python", "-m", f"stages.{stage}", band, method)
         figures[band] = band_figures(params, run, band, progress)
-    draw_figure(figures, ROOT / "reports/validation/gap.png")
     met = {}
     for band, content in figures.items():
         ours, most = content["methods"][OURS]["variants"][AS_IT_IS], content["floor"]

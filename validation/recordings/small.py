@@ -28,10 +28,7 @@ CONTAINERS = {
     "lz4": {"compression": CompressionType.LZ4},
     "plain": {"compression": CompressionType.NONE},
     "unchunked": {"use_chunking": False, "enable_data_crcs": True},
-    "unchecked": {"use_chunking": False},
-    "garbage": {"compression": CompressionType.ZSTD},  # inside of chunks, checksums mended
 }
-CHECKED = ("zstd", "lz4", "plain", "unchunked")  # damage must be noticed
 TRUTH = Truth(grasp=0.4, lifted=0.6, drawn=1.1, release=1.6003, end=2.2, radius=0.012)
 LENS = Lens(size=(80, 60), focal=62.5, fps=8)
 STATE = "franka_msgs/msg/FrankaRobotState"

@@ -22,6 +22,7 @@ from validation.simulator.closed import (
     stress,
 )
 from validation.simulator.experiment import (
+    TIGHT,
     band_of,
     move,
     settling,
@@ -188,6 +189,12 @@ def _of_histories(
     return checks
 
 
+def growth(bench: Bench, count: int = 16) -> list[Measure]:
+    """Elastic, kinetic and the branches' energy after random states, relaxed there, are let go."""
+    points = random_points(bench, count)
+    return damping.growth(bench, rubber_of(bench), points, FORMULAS, **TIGHT)
+
+
 def slack(bench: Bench) -> list[Measure]:
     """A band that relaxed while drawn and is led back to its rest length pushes the hand no more.
 
@@ -250,9 +257,9 @@ def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Measure]:
     ]
 
 
-def random_points(bench: Bench, count: int, law: str = RUBBER) -> Parameters:
+def random_points(bench: Bench, count: int) -> Parameters:
     """Random points of the box in params.yaml, and of BOX for what the law adds."""
-    box = SearchBox.of(bench.params.parameters, bounds=BOX if law == RUBBER else {}, law=law)
+    box = SearchBox.of(bench.params.parameters, bounds=BOX, law=RUBBER)
     unit = np.random.default_rng(SEED).random((count, box.dimension))
     return box.parameters(box.to_physical(unit))
 
@@ -276,7 +283,7 @@ def section(bench: Bench) -> Theme:
             *flow(bench),
             *agreement.checks(bench, 2, sling=sling, **law_parameters()),
             *energy.checks(balance),
-            *damping.growth(bench, sling, random_points(bench, damping.COUNT), FORMULAS),
+            *growth(bench),
             *slack(bench),
             *histories(bench),
             *launching.convergence(bench, sling=sling, history=HISTORY, **law_parameters()),

@@ -11,11 +11,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
 from pipeline.base.machine import gpus
 from validation.engines import checks as engines
+from validation.environment import environment
 from validation.reports import row
 from validation.simulator import (
     agreement,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -33,7 +32,6 @@ class Evaluation:
         terms: Each loss term, shape (N,); NaN where the rollout failed.
         total: Weighted sum of the terms, shape (N,); +inf where the rollout failed.
         failure: None or the reason, length N.
-        seconds: What it took.
     """
 
     unit: np.ndarray
@@ -41,7 +39,6 @@ class Evaluation:
     terms: dict[str, np.ndarray]
     total: np.ndarray
     failure: list[str | None]
-    seconds: float = 0.0
 
 
 class Evaluator:
@@ -82,7 +79,6 @@ class Evaluator:
 
     def __call__(self, unit: np.ndarray) -> Evaluation:
         """Evaluate points of the unit cube, shape (N, D)."""
-        start = time.perf_counter()
         unit = np.array(unit, float)
         theta = self.box.to_physical(unit)
         shares = np.array_split(theta, len(self._devices))
@@ -102,7 +98,7 @@ class Evaluator:
         failed = np.array([reason is not None for reason in failure])
         terms = {name: np.where(failed, np.nan, values) for name, values in terms.items()}
         total = np.where(failed, np.inf, total)
-        return Evaluation(unit, theta, terms, total, failure, time.perf_counter() - start)
+        return Evaluation(unit, theta, terms, total, failure)
 
     def _slices(self, theta: np.ndarray) -> Iterator[np.ndarray]:
         return (theta[i : i + self._slice] for i in range(0, len(theta), self._slice))

@@ -35,7 +35,6 @@ class LoggingEvaluator:
             f"generation {self._generation}",
             f"best {self._best:.5g}",
             f"failed {failed}/{count}",
-            seconds=evaluation.seconds,
         )
         self._generation += 1
         return evaluation

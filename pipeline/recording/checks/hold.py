@@ -49,6 +49,8 @@ CHECKS = (DIRECTION, STIFFNESS)
 def findings(done: Processed) -> Iterator[Finding]:
     hold = hold_of(done)
     yield from _of_stiffness(hold)
+    if not done.weighed:  # its weight turns the force by degrees
+        return
     ways = ("lifts", "presses down"), ("pulls to the right", "pulls to the left")
     directions = "out of its plane", "off the middle of its strands"
     for k, force in enumerate((hold.lift, hold.aside)):

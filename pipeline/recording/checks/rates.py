@@ -60,7 +60,7 @@ BURSTS = Check(
 )
 HELD = Check(
     "held",
-    "how often the values of force, pose and twist change with how often they are sent",
+    "how often the values of force and pose change with how often they are sent",
     "none: they are counted",
     f"each is sent {SENT:g} times or more: only its first message counts",
     "",

@@ -9,16 +9,16 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from functools import lru_cache
-from os import SEEK_END
 from pathlib import Path
 
-from mcap.opcode import Opcode
+from mcap.records import Chunk, Message
 from ruamel.yaml import YAML, YAMLError
 
 from pipeline.base.errors import UserError, printable
-from pipeline.recording.input import records as of
 from pipeline.recording.input.opened import is_mcap, opened
+from pipeline.recording.input.records import DAMAGE, records
 
 METADATA, SUFFIX = "metadata.yaml", ".mcap"
 PACKED = re.compile(r"\.(zstd?|gz|lz4)$")  # behind it, where the whole file is packed
@@ -210,10 +210,10 @@ def _span(part: Path, _written: int) -> tuple[int, int] | None:
     times: list[int] = []
     if not is_mcap(part):
         return None
-    with opened(part) as file:
-        for record in of.walk(file, file.seek(0, SEEK_END)):
-            if record.opcode == Opcode.CHUNK and record.content.message_end_time:
-                times += (record.content.message_start_time, record.content.message_end_time)
-            elif record.opcode == Opcode.MESSAGE:
-                times.append(of.MESSAGE.unpack_from(record.content)[2])
+    with opened(part) as file, suppress(*DAMAGE):
+        for record in records(file):
+            if isinstance(record, Chunk) and record.message_end_time:
+                times += (record.message_start_time, record.message_end_time)
+            elif isinstance(record, Message):
+                times.append(record.log_time)
     return (min(times), max(times)) if times else None

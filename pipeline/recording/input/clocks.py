@@ -19,7 +19,7 @@ are one or two at the ends that log_time puts elsewhere.
 
 A whole topic on another clock than the wrench's can be tied to it by log_time only as well as the
 two transports' least delays agree: about a millisecond for what a controller publishes (pose,
-twist, gripper), which is put right, but tens of milliseconds for pictures, where a millisecond
+gripper), which is put right, but tens of milliseconds for pictures, where a millisecond
 costs 25 % of the damping: they are refused.
 
 Delays of receipt do not grow by themselves, so where a topic's least delays change against the

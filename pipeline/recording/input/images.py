@@ -14,8 +14,6 @@ __all__ = ["LARGEST", "Undecodable", "Unsupported"]
 
 # compressed_depth_image_transport: format, depth quantisation A and B
 DEPTH_HEADER = struct.Struct("<iff")
-RVL_SIZE = struct.Struct("<II")  # columns, rows
-LARGEST_RVL = 2**22  # pixels, whose decoding takes a hundred bytes for each
 PNG = np.frombuffer(b"\x89PNG\r\n\x1a\n", np.uint8)
 COLORS = {
     "rgb8": (3, cv2.COLOR_RGB2BGR),
@@ -82,8 +80,9 @@ def depth(picture: Picture) -> np.ndarray:
         )
     if not len(body):
         raise Undecodable("compressedDepth without a picture")
-    is_rvl = "rvl" in picture.format.lower()
-    packed = rvl(body) if is_rvl else unpacked(body, cv2.IMREAD_UNCHANGED, picture.format)
+    if "rvl" in picture.format.lower():
+        raise Unsupported("compressedDepth in RVL is not read: record it in PNG")
+    packed = unpacked(body, cv2.IMREAD_UNCHANGED, picture.format)
     if not floats:
         return _metres(packed)
     _, scale, offset = DEPTH_HEADER.unpack_from(picture.data.data)
@@ -112,8 +111,6 @@ def size_of(picture: Picture) -> tuple[int, int] | None:
     data = picture.data
     if "compressedDepth" in picture.format:
         data = _body(data)
-        if "rvl" in picture.format.lower():
-            return RVL_SIZE.unpack_from(data.data) if len(data) >= RVL_SIZE.size else None
     try:
         return header(data).size
     except Undecodable:
@@ -123,60 +120,6 @@ def size_of(picture: Picture) -> tuple[int, int] | None:
 def _body(data: np.ndarray) -> np.ndarray:
     """Return what follows a compressedDepth message's header, which some writers leave out."""
     return data if np.array_equal(data[: len(PNG)], PNG) else data[DEPTH_HEADER.size :]
-
-
-def rvl(data: np.ndarray) -> np.ndarray:
-    """Run-length and variable-length coded depth, shape (H, W), uint16. Raises Undecodable.
-
-    Wilson, "Fast Lossless Depth Image Compression", ISS 2017. The packages at hand take data that
-    are cut off or damaged without a word, so it is decoded here, nearly all of it in NumPy.
-    """
-    if len(data) < RVL_SIZE.size:
-        raise Undecodable("RVL without a picture")
-    width, height = RVL_SIZE.unpack_from(data.data)
-    pixels = width * height
-    if not 0 < pixels <= LARGEST_RVL or len(data) > RVL_SIZE.size + 4 * pixels + 4:
-        raise Undecodable(f"RVL of {len(data)} bytes, {width} x {height} pixels")
-    words = data[RVL_SIZE.size :][: (len(data) - RVL_SIZE.size) // 4 * 4].reshape(-1, 4)
-    octets = words[:, ::-1].ravel()  # the nibbles of a word begin at its highest bits
-    nibbles = np.stack([octets >> 4, octets & 15], axis=1).ravel()
-    # A value is its nibbles' lower three bits, the lowest first; the last one lacks the bit 8.
-    ends = np.flatnonzero(nibbles < 8)[: 3 * pixels + 2]  # each run, of at least a pixel, has two
-    starts = np.concatenate([[0], ends[:-1] + 1])
-    lengths = ends - starts
-    if not len(ends) or lengths.max() > 9:  # more than 30 bits
-        raise Undecodable("damaged RVL")
-    values = (nibbles[starts] & 7).astype(np.int64)
-    for more in range(1, int(lengths.max()) + 1):
-        longer = np.flatnonzero(lengths >= more)
-        values[longer] |= (nibbles[starts[longer] + more] & 7).astype(np.int64) << (3 * more)
-
-    # Runs: how many pixels lack a depth, how many have one, and each one's change of depth.
-    first_pixels, first_values, counts = [], [], []
-    pixel = at = 0
-    numbers = values.tolist()
-    while pixel < pixels:
-        if at + 1 >= len(numbers):
-            raise Undecodable("RVL is cut off")
-        zeros, count = numbers[at], numbers[at + 1]
-        pixel, at = pixel + zeros, at + 2
-        if zeros + count == 0 or pixel + count > pixels or at + count > len(numbers):
-            raise Undecodable("damaged RVL")
-        first_pixels.append(pixel)
-        first_values.append(at)
-        counts.append(count)
-        pixel, at = pixel + count, at + count
-    zigzag = values[_within(first_values, counts, len(values))]
-    depth = np.zeros(pixels, np.uint16)
-    depth[_within(first_pixels, counts, pixels)] = np.cumsum((zigzag >> 1) ^ -(zigzag & 1)) & 0xFFFF
-    return depth.reshape(height, width)
-
-
-def _within(firsts: list[int], counts: list[int], size: int) -> np.ndarray:
-    """Mask of runs that do not overlap, shape (size,)."""
-    begins = np.bincount(firsts, minlength=size + 1)
-    ends = np.bincount(np.add(firsts, counts), minlength=size + 1)
-    return np.cumsum(begins - ends)[:size] > 0
 
 
 def _rows(picture: Picture, kind: type, channels: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The hand's pose where it was not recorded: from joint positions by URDF, or from its twist.
+"""The hand's pose where it was not recorded: from joint positions by URDF.
 
 A URDF is plain XML of which only the joints count here; `xml.etree` reads those without the meshes
 and viewers that URDF packages come with. Conventions: wiki.ros.org/urdf/XML/joint.
@@ -106,26 +106,6 @@ def chain_of(file: str, tip: str | None = None) -> Chain:
     if not moving:
         raise UserError(f"{path}: no joint moves {tip}, set setup.tip_link to the hand")
     return Chain(link, tip, tuple(chain), tuple(dict.fromkeys(moving)))
-
-
-def integrated(stamps: np.ndarray, twists: np.ndarray, start: tuple[float, ...]) -> np.ndarray:
-    """Poses of a hand that begins at `start` and moves with these twists, shape (S, 7).
-
-    Args:
-        stamps: ns, shape (S,), increasing.
-        twists: Linear velocity of the hand's origin and angular velocity, both along the axes of
-            the frame that the poses are to be in, shape (S, 6).
-        start: x y z qx qy qz qw at the first stamp.
-    """
-    steps = np.diff(stamps)[:, None] * 1e-9
-    ways = 0.5 * (twists[1:] + twists[:-1]) * steps
-    place = np.vstack([np.zeros(3), np.cumsum(ways[:, :3], axis=0)]) + start[:3]
-    turn = Rotation.from_quat(np.vstack([start[3:], Rotation.from_rotvec(ways[:, 3:]).as_quat()]))
-    reach = 1  # running product of rotations: each pass doubles how far back it reaches
-    while reach < len(turn):
-        turn = Rotation.concatenate([turn[:reach], turn[reach:] * turn[:-reach]])
-        reach *= 2
-    return np.hstack([place, turn.as_quat()])
 
 
 def _joints(path: Path) -> list[Joint]:

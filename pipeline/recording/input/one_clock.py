@@ -19,7 +19,7 @@ from pipeline.recording.input import clocks, pace
 from pipeline.recording.input.raw import Raw
 from pipeline.recording.input.roles import CAMERAS
 
-CORRECTABLE = ("pose", "twist", "gripper")  # by log_time, if they have a clock of their own
+CORRECTABLE = ("pose", "gripper")  # by log_time, if they have a clock of their own
 TWIN_TIME, TWIN_SIZE = 0.5e9, 5e6  # ns by which one step differs between two topics, at most
 
 

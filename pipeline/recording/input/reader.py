@@ -31,7 +31,7 @@ from pipeline.recording.input.words import shortened
 
 SHOWN = 3  # losses in an error
 LINE, LOSS = 1000, 300  # characters of an error and of a loss in it
-STREAMS = ("wrench", "pose", "twist", "gripper", *CAMERAS)
+STREAMS = ("wrench", "pose", "gripper", *CAMERAS)
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,6 @@ class Recording:
     Attributes:
         wrench: Force [N] in `wrench.frame`, values (S, 3).
         pose: Position [m] and quaternion xyzw in `pose.frame`, values (S, 7).
-        twist: Velocity [m/s] and angular velocity [rad/s], values (S, 6); None where not recorded.
         gripper: Sum of the finger positions, as they are reported [m], values (S, 1); None where
             not recorded.
         color, depth: `Picture`s, decoded by `pipeline.recording.input.images`.
@@ -50,7 +49,6 @@ class Recording:
         losses: What was lost of the file or mended in it, in words.
         notes: What else to know of it, which cost nothing.
         choices: Why each role has its topic.
-        doubts: Why a role could have another topic.
         sha256: Hash of the file.
         start: From which seconds count [ns]: the file's first force, also in a part of it; None
             for that of `wrench`.
@@ -68,10 +66,8 @@ class Recording:
     transforms: TransformTree
     losses: list[str] = field(default_factory=list)
     sha256: str = ""
-    twist: Stream[np.ndarray] | None = None
     notes: list[str] = field(default_factory=list)
     choices: dict[str, str] = field(default_factory=dict)
-    doubts: dict[str, str] = field(default_factory=dict)
     start: int | None = None
     late: dict[str, float] = field(default_factory=dict)
 
@@ -100,11 +96,10 @@ class Recording:
         return replace(self, **cut, start=self.origin)
 
     def shifted(self, pose: float = 0.0, camera: float = 0.0) -> Recording:
-        """Copy with stamps that are late by so many seconds put right: pose and twist; pictures."""
+        """Copy with stamps that are late by so many seconds put right."""
         return replace(
             self,
             pose=self.pose.shifted(pose),
-            twist=self.twist and self.twist.shifted(pose),
             color=self.color.shifted(camera),
             depth=self.depth.shifted(camera),
         )
@@ -125,7 +120,7 @@ def recording_of(
     """Do what `read_recording` does, from a file that was read already."""
     try:
         transforms = transforms_of(container)
-        chosen = choose(container, setup, transforms.frames)
+        chosen = choose(container, setup)
         color_camera, depth_camera = (camera_of(chosen, role) for role in CAMERAS)
         by_role = {role: chosen[role] for role in STREAMS if role in chosen}
         late = late_by(delays)
@@ -137,7 +132,6 @@ def recording_of(
         path=container.path,
         wrench=streams["wrench"],
         pose=streams["pose"],
-        twist=streams.get("twist"),
         gripper=streams.get("gripper"),
         color=streams["color"],
         depth=streams["depth"],
@@ -147,7 +141,6 @@ def recording_of(
         losses=[*container.losses, *lost],
         notes=[*container.notes, *remarks],
         choices={role: choice.why for role, choice in chosen.items()},
-        doubts={role: choice.doubt for role, choice in chosen.items() if choice.doubt},
         sha256=sha256(container.path),
         late={role: seconds for role, seconds in late.items() if role in streams},
     )
@@ -156,7 +149,7 @@ def recording_of(
 def late_by(delays: DelayParams | None) -> dict[str, float]:
     """Seconds by which the stamps of each role are given to be late; none where nothing is."""
     given = {"pose": delays and delays.pose, "camera": delays and delays.camera}
-    roles = {"pose": ("pose", "twist"), "camera": CAMERAS}
+    roles = {"pose": ("pose",), "camera": CAMERAS}
     return {role: late for name, late in given.items() if late for role in roles[name]}
 
 

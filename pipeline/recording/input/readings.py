@@ -18,10 +18,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.base.errors import printable
+from pipeline.base.errors import UserError, printable
 from pipeline.recording.input.decode import Elsewhere, Message
 
 LATEST = 2**62  # ns; a stamp beyond it is damage
+MOVES = 0.3  # of the largest movement: joints that move less are no fingers, or another hand's
+ALIKE = 0.9  # correlation of fingers that move as one
 FRANKA_BASE = "franka_base"  # frame of Franka states whose header names none, as franka_ros writes
 
 
@@ -59,8 +61,8 @@ class Reading(NamedTuple):
     Attributes:
         stamp: Of its header [ns]; None where the type has none.
         frame: frame_id, "" where there is none.
-        value: wrench fx fy fz [N]; pose x y z [m] qx qy qz qw; twist vx vy vz [m/s] wx wy wz
-            [rad/s]; gripper and joints: positions [rad, m]; a Picture; a Calibration.
+        value: wrench fx fy fz [N]; pose x y z [m] qx qy qz qw; gripper and joints: positions
+            [rad, m]; a Picture; a Calibration.
     """
 
     stamp: int | None
@@ -112,11 +114,6 @@ def read_pose(message: Message) -> Reading:
     return _reading(message, pose_of(pose))
 
 
-def read_twist(message: Message) -> Reading:
-    twist = getattr(message.twist, "twist", message.twist)  # TwistWithCovariance
-    return _reading(message, (*_vector(twist.linear), *_vector(twist.angular)))
-
-
 def read_state_pose(message: Message) -> Reading:
     """O_T_EE: a PoseStamped in FrankaRobotState, a column-major 4 x 4 in FrankaState."""
     pose = first_of(message, "o_t_ee", "O_T_EE")
@@ -145,6 +142,24 @@ def fingers_reader(names: tuple[str, ...]) -> Callable[[Message], Reading]:
     """Positions of these joints: two fingers that each move half the opening, or one value."""
     read = joints_reader(names, "")
     return lambda message: read(message)._replace(frame=frame_of(message))
+
+
+def opening_of(values: np.ndarray, topic: str, names: tuple[str, ...]) -> np.ndarray:
+    """Opening of a hand, shape (S, 1), from the positions of its fingers (S, C).
+
+    Fingers of a mirrored sign count the other way round, those that hardly move not at all. Raises
+    UserError where the others do not move as one, as those of two hands.
+    """
+    moved = np.ptp(values, axis=0)
+    counts = moved >= MOVES * moved.max()
+    fingers = values[:, counts]
+    if moved.max() == 0:
+        return fingers.sum(axis=1, keepdims=True)
+    likeness = np.corrcoef(fingers.T, values[:, np.argmax(moved)])[-1, :-1]
+    if np.abs(likeness).min() < ALIKE:
+        moving = ", ".join(name for name, counted in zip(names, counts, strict=True) if counted)
+        raise UserError(f"{topic}: the joints {moving} do not move as the fingers of one hand")
+    return (fingers * np.sign(likeness)).sum(axis=1, keepdims=True)
 
 
 def joints_reader(names: tuple[str, ...], frame: str) -> Callable[[Message], Reading]:

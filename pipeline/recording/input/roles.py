@@ -23,20 +23,19 @@ from pipeline.recording.input.decode import (
     Value,
     message_reader,
 )
-from pipeline.recording.input.kinematics import chain_of, integrated
+from pipeline.recording.input.kinematics import chain_of
 from pipeline.recording.input.readings import Reading
 
 TRIES = 9  # messages that are looked at to know a topic
-JOINT_TRIES = 50  # of joints and twists: some share their topic with other publishers
+JOINT_TRIES = 50  # of joints: some share their topic with other publishers
 JOINTS_SHOWN = 12  # joints named in a message
-TOOLS = {"tcp", "ee", "eef", "tool", "tool0", "hand", "flange", "gripper"}
 FINGERS = ("finger", "gripper", "knuckle")
-OPTIONAL = ("twist", "gripper")
+OPTIONAL = ("gripper",)
 COMMANDS = ("goal", "desired", "command", "commanded", "cmd", "target", "reference", "setpoint")
 THINGS = ("camera", "object", "tag", "marker")
 
 Read = Callable[[Message], Reading]
-Convert = Callable[[np.ndarray, np.ndarray], np.ndarray]
+Convert = Callable[[np.ndarray], np.ndarray]
 Source = tuple[Read, Convert | None]
 
 
@@ -48,16 +47,14 @@ class Choice:
         channel: Raw payloads.
         read: Payload to reading; raises Unreadable.
         why: One phrase.
-        doubt: Why another could be meant, a phrase; "" where none could.
-        convert: Sorted stamps [ns], shape (S,), and values, shape (S, C), to what the role asks
-            for, shape (S, 7) or (S, 1); None where the values are that already.
+        convert: All values, shape (S, C), to what the role asks for, shape (S, 7) or (S, 1); None
+            where the values are that already. Raises UserError.
     """
 
     channel: Channel
     read: Callable[[bytes], Reading]
     why: str = ""
     convert: Convert | None = None
-    doubt: str = ""
 
     def typical(self) -> Reading:
         """The first message of the frame and kind that most have. Raises UserError."""
@@ -108,15 +105,8 @@ STATES = ("FrankaRobotState", "FrankaState")
 JOINTS: dict[str, Read | None] = dict.fromkeys(("JointState", "JointStates"))
 POSES = ("PoseStamped", "PoseInFrame", "PoseWithCovarianceStamped")
 POSE: dict[str, Read] = dict.fromkeys(POSES, of.read_pose)
-TWISTS = ("TwistStamped", "TwistWithCovarianceStamped")
-TWIST: dict[str, Read] = dict.fromkeys(TWISTS, of.read_twist)
 IMAGES: dict[str, Read] = dict.fromkeys(("Image", "RawImage", "CompressedImage"), of.read_image)
 INFO: dict[str, Read] = dict.fromkeys(("CameraInfo", "CameraCalibration"), read_calibration)
-HAND = {
-    "hints": ("current", "ee", "eef", "tcp", "end_effector", "measured"),
-    "doubts": (*COMMANDS, *THINGS),
-    "rate": 10,
-}
 CAMERAS = ("color", "depth")  # roles of pictures
 ROLES = {
     "wrench": Role(
@@ -129,10 +119,11 @@ ROLES = {
     ),
     "pose": Role(
         "end-effector pose (a geometry_msgs/PoseStamped topic)",
-        {**POSE, **dict.fromkeys(STATES, of.read_state_pose), **JOINTS, **dict.fromkeys(TWIST)},
-        **HAND,
+        {**POSE, **dict.fromkeys(STATES, of.read_state_pose), **JOINTS},
+        hints=("current", "ee", "eef", "tcp", "end_effector", "measured"),
+        doubts=(*COMMANDS, *THINGS),
+        rate=10,
     ),
-    "twist": Role("end-effector twist (a geometry_msgs/TwistStamped topic)", TWIST, **HAND),
     "gripper": Role(
         "gripper (a sensor_msgs/JointState topic)",
         JOINTS,
@@ -190,26 +181,24 @@ class Candidate:
         return [doubt for doubt in self.role.doubts if doubt in self._words]
 
     @property
-    def commanded(self) -> bool:
-        """Whether it says what the robot shall do, by its name, and not what was measured."""
-        return bool(set(self.doubts) & set(COMMANDS))
-
-    @property
     def _words(self) -> list[str]:
         return re.findall("[a-z]+", self.topic.lower())  # infra1 is infra
 
-    def merit(self) -> tuple:
-        """Measured, not spare, no doubts, a likely rate, kind, hints, messages; the alphabet."""
+    def standing(self) -> tuple:
+        """What decides: measured, not spare, no doubts, a likely rate, kind, whether hints."""
         return (
-            not self.commanded,
+            not set(self.doubts) & set(COMMANDS),
             self.kind not in self.role.spare,
             -len(self.doubts),
             self.rate >= self.role.rate,
             -list(self.role.readers).index(self.kind),
-            len(self.hints),
-            len(self.choice.channel.payloads),
-            [-ord(c) for c in self.topic],
+            bool(self.hints),
         )
+
+    def merit(self) -> tuple:
+        """The standing; among topics of one standing number of messages, and the alphabet."""
+        count = len(self.choice.channel.payloads)
+        return *self.standing(), count, [-ord(c) for c in self.topic]
 
 
 def source_of(
@@ -232,8 +221,6 @@ def source_of(
         return _gripper(channel, decode, named)
     if role == "pose" and kind in JOINTS:
         return _arm(channel, decode, setup)
-    if role == "pose" and kind in TWIST:
-        return _motion(channel, decode, setup, TWIST[kind])
     read = ROLES[role].readers[kind]
     return read and (read, None)
 
@@ -245,7 +232,10 @@ def _gripper(channel: Channel, decode: Decoder, named: bool) -> Source | None:
         fingers = tuple(name for name in names if _has(FINGERS, name))
         if fingers or by_topic:
             only = tuple(name for name in fingers if "finger" in name.lower())
-            return of.fingers_reader(only or fingers or names), None
+            moving = only or fingers or names
+            return of.fingers_reader(moving), partial(
+                of.opening_of, topic=channel.topic, names=moving
+            )
     return None
 
 
@@ -269,25 +259,7 @@ def _arm(channel: Channel, decode: Decoder, setup: SetupParams) -> Source | None
             f"{channel.topic} lacks joint {lacks} of {setup.urdf}, it has {has}: check setup.urdf"
             " and setup.tip_link"
         )
-    read = of.joints_reader(chain.names, chain.root)
-    return read, lambda stamps, values: chain.poses(values)
-
-
-def _motion(channel: Channel, decode: Decoder, setup: SetupParams, read: Read) -> Source:
-    """A twist alone, integrated from params' start pose."""
-    frames, _ = readable(message_reader(decode, of.frame_of), channel.payloads[:JOINT_TRIES], None)
-    frame = Counter(frames).most_common(1)[0][0] if frames else ""
-    if set(frame.lower().split("_")) & TOOLS:
-        raise UserError(
-            f"the twist on {channel.topic} is along the axes of the hand ({frame}), publish it"
-            " along those of the robot's base"
-        )
-    if setup.start_pose is None:
-        raise UserError(
-            f"{channel.topic} has a twist: give the hand's pose in the base at its first message"
-            " in setup.start_pose"
-        )
-    return read, partial(integrated, start=setup.start_pose)
+    return of.joints_reader(chain.names, chain.root), chain.poses
 
 
 def _joint_names(channel: Channel, decode: Decoder) -> list[tuple[str, ...]]:

@@ -7,30 +7,17 @@ that they are made of. The standard types are the same in all distributions of t
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
 import zstandard
-from mcap.records import Schema
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 ZSTD = b"\x28\xb5\x2f\xfd"  # no header of CDR begins so
 XCDR2 = range(0x06, 0x0C)  # second byte: OMG DDS-XTypes 1.3, table 60
 PACKAGES = ("geometry_msgs", "sensor_msgs", "std_msgs", "tf2_msgs")
-STAMPED = (
-    "geometry_msgs/msg/WrenchStamped",
-    "geometry_msgs/msg/PoseStamped",
-    "sensor_msgs/msg/JointState",
-    "sensor_msgs/msg/CompressedImage",
-    "sensor_msgs/msg/Image",
-    "sensor_msgs/msg/CameraInfo",
-    "tf2_msgs/msg/TFMessage",
-)
-TWISTS = ("geometry_msgs/msg/TwistStamped",)
-LONGEST = 2**27  # bytes of a message
-EMPTY = 8  # bytes of CDR's header and of a list without anything
 RULE = re.compile("^=+$", re.MULTILINE)  # between the types of a schema
 
 
@@ -60,32 +47,6 @@ def reader(schema: str) -> Callable[[bytes], Any]:
     """Make a function from payload to message, of a standard type."""
     store, name = _store(), name_of(schema)
     return lambda payload: store.deserialize_cdr(payload, name)
-
-
-def guessed(topic: str, encoding: str, payloads: Sequence[bytes]) -> Schema | None:
-    """The standard type as which messages without any schema can be read and written again alike.
-
-    A wrench and a twist are the same bytes: the topic's name tells.
-    """
-    if encoding != "cdr" or not payloads:
-        return None
-    some = [payloads[k * (len(payloads) - 1) // 2] for k in range(3)]
-    for name in TWISTS if "twist" in topic.lower() else STAMPED:
-        try:
-            if all(_same(plain(payload, LONGEST), name) for payload in some):
-                return Schema(id=0, data=b"", encoding="", name=name)
-        except Exception:  # bytes of another type make the library raise anything
-            continue
-    return None
-
-
-def _same(payload: bytes, name: str) -> bool:
-    little = payload[1:2] == b"\x01"
-    message = _store().deserialize_cdr(payload, name)
-    written = bytes(_store().serialize_cdr(message, name, little_endian=little))
-    if len(written) <= EMPTY:
-        return False
-    return written[4:] == payload[4:][: len(written) - 4] and len(payload) - len(written) < 4
 
 
 def plain(payload: bytes, most: int) -> bytes:

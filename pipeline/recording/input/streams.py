@@ -7,8 +7,9 @@ pose, is alone far off those around it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -26,7 +27,9 @@ from pipeline.recording.input.words import counted
 LONE = {"wrench": 30.0, "pose": 0.05}  # N, m
 MOST_LONE = 0.05  # share of the messages that may be alone: more are the sensor's noise, or units
 FASTEST = 2.0  # m/s of the hand
-HELD = ("wrench", "pose", "twist")  # roles of which each value is measured anew
+HELD = ("wrench", "pose")  # roles of which each value is measured anew
+
+Value = TypeVar("Value")
 
 
 def streams_of(
@@ -35,28 +38,37 @@ def streams_of(
     """All topics on the wrench's clock, and remarks on what costs nothing.
 
     Args:
-        chosen: Choices of wrench, pose, color, depth, and of twist and gripper if there are.
+        chosen: Choices of wrench, pose, color, depth, and of gripper if there is one.
         late: By what the stamps of a role are known to be late [s], which is taken off.
 
     Raises:
         UserError: for a topic that cannot be used, in one line.
     """
-    topics, notes = {}, []
-    for role, choice in chosen.items():
-        try:
-            topics[role] = read_raw(role, choice)
-        except UserError as error:
-            if role not in OPTIONAL:
-                raise
-            notes.append(f"{error}: done without it")
+    notes: list[str] = []
+    topics = _usable(
+        {role: partial(read_raw, role, choice) for role, choice in chosen.items()}, notes
+    )
     put_on_one_clock(topics, late or {})
-    streams = {role: _sorted(raw) for role, raw in topics.items()}
+    streams = _usable({role: partial(_sorted, raw) for role, raw in topics.items()}, notes)
     origin = int(streams["wrench"].stamp[0])
     first = min(stream.stamp[0] for stream in streams.values())
     last = max(stream.stamp[-1] for stream in streams.values())
     for stream in streams.values():
         stream.notes.extend(gaps_of(stream, origin, first, last))
     return streams, notes + frozen(streams, origin)
+
+
+def _usable(made: Mapping[str, Callable[[], Value]], notes: list[str]) -> dict[str, Value]:
+    """What is made of each role, without the optional roles of which nothing can be made."""
+    results = {}
+    for role, make in made.items():
+        try:
+            results[role] = make()
+        except UserError as error:
+            if role not in OPTIONAL:
+                raise
+            notes.append(f"{error}: done without it")
+    return results
 
 
 def _sorted(raw: Raw) -> Stream[Any]:
@@ -72,7 +84,7 @@ def _sorted(raw: Raw) -> Stream[Any]:
         if raw.role in LONE and raw.choice.convert is None:
             values = _without_lone(raw, values)
         if raw.choice.convert is not None:
-            values = raw.choice.convert(raw.stamp, values)
+            values = raw.choice.convert(values)
     hold = pace.hold_of(raw.stamp, values) if raw.role in HELD else None
     if hold:
         retained = pace.first_of_each(raw.stamp, values, hold)

@@ -1,10 +1,15 @@
-"""Which topic plays which role: by params, else by type, rate, and words in the name."""
+"""Which topic plays which role: by params, else by type, rate, and words in the name.
+
+Where two topics would do as well, params must say which is meant: what moves together, and which of
+two arms pulled the band, is not guessed.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from os.path import commonprefix
 
 import numpy as np
 
@@ -13,7 +18,6 @@ from pipeline.params.lab import SetupParams
 from pipeline.recording.input import images
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import Camera, camera_from
-from pipeline.recording.input.company import Company
 from pipeline.recording.input.container import Container
 from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.decode import Unreadable, decoder, message_reader
@@ -34,29 +38,30 @@ COLOUR = {"color": "colour", "depth": "depth"}
 VIDEO = ("FFMPEGPacket", "CompressedVideo")
 
 
-def choose(
-    container: Container, setup: SetupParams, frames: Collection[str] = ()
-) -> dict[str, Choice]:
+def choose(container: Container, setup: SetupParams) -> dict[str, Choice]:
     """Role to channel, for every role of ROLES that the file has.
 
     Args:
         container: What was read.
-        setup: params.setup: topics (a topic's name for a role, or None), urdf, tip_link,
-            start_pose.
-        frames: Those that /tf_static knows.
+        setup: params.setup: topics (a topic's name for a role, or None), urdf, tip_link.
 
     Raises:
-        UserError: for a role that nothing can play, with what the file has and how to mend it.
+        UserError: for a role that nothing can play, with what the file has and how to mend it; or
+            for those that several topics could play, with the settings that decide.
     """
-    chooser = _Chooser(container, setup, frames)
+    chooser = _Chooser(container, setup)
     chosen: dict[str, Choice] = {}
     for role in ROLES:
         choice = chooser.choice(role, chosen)
         if choice is not None:
-            gripper = role == "gripper"
-            chosen[role] = chooser.company.opened(choice, chosen["wrench"]) if gripper else choice
+            chosen[role] = choice
         elif role not in OPTIONAL:
             raise chooser.lacking(role)
+    if chooser.ambiguous:
+        raise UserError(
+            f"several topics would do: {'; '.join(chooser.ambiguous)}: name those that are meant in"
+            " params.yaml"
+        )
     return chosen
 
 
@@ -70,40 +75,29 @@ def camera_of(chosen: dict[str, Choice], role: str) -> Camera:
 class _Chooser:
     """Goes through the channels of one file, role by role."""
 
-    def __init__(
-        self, container: Container, setup: SetupParams, frames: Collection[str] = ()
-    ) -> None:
+    def __init__(self, container: Container, setup: SetupParams) -> None:
         self.container, self.setup = container, setup
         self.problems: list[str] = []  # why channels of the right type could not be used
-        self.fitting: dict[str, tuple[list[Candidate], list[str]]] = {}
-        self.company = Company(self._fitting, frames)
+        self.ambiguous: list[str] = []  # settings of roles that several topics could play
 
     def choice(self, role: str, chosen: dict[str, Choice]) -> Choice | None:
         self.problems = []
         name = getattr(self.setup.topics, role)
         if name is not None:
             return self._named(role, name)
-        candidates = self._fitting(role)
+        fitting = [self._candidate(role, channel) for channel in self.container.channels]
+        candidates = [topic for topic in fitting if topic is not None and self._suits(role, topic)]
         if role.endswith("_info"):
             return self._info(candidates, role.removesuffix("_info"), chosen)
-        if role == "twist":  # a command is not a measurement
-            candidates = [candidate for candidate in candidates if not candidate.doubts]
-        best, doubt = self.company.best(role, candidates, chosen)
-        if best is None:
-            self.problems[:0] = [doubt] if doubt else []
+        if not candidates:
             return None
-        return replace(best.choice, why=_why(best, candidates), doubt=doubt)
-
-    def _fitting(self, role: str) -> list[Candidate]:
-        """Candidates that could play the role by what they are, looked for once."""
-        if role not in self.fitting:
-            self.problems = []
-            fitting = [self._candidate(role, channel) for channel in self.container.channels]
-            suiting = [topic for topic in fitting if topic is not None and self._suits(role, topic)]
-            self.fitting[role] = suiting, self.problems
-        candidates, problems = self.fitting[role]
-        self.problems = [*problems]
-        return candidates
+        if role == "depth":
+            candidates = _nearest(candidates, chosen["color"])
+        best = max(candidates, key=Candidate.merit)
+        alike = {_source(c.topic) for c in candidates if c.standing() == best.standing()}
+        if len(alike) > 1:
+            self.ambiguous.append(f"setup.topics.{role} {few(sorted(alike), SHOWN)}")
+        return replace(best.choice, why=_why(best, candidates))
 
     def lacking(self, role: str) -> UserError:
         what = ROLES[role].what
@@ -235,6 +229,23 @@ def undecodable(role: str, choice: Choice) -> str | None:
         else:
             return None
     return reasons.most_common(1)[0][0]
+
+
+def _source(topic: str) -> str:
+    """A topic's name without that of the transport, by which one picture is sent several times."""
+    return topic.removesuffix("/compressed").removesuffix("/compressedDepth")
+
+
+def _nearest(depths: list[Candidate], color: Choice) -> list[Candidate]:
+    """Those in the colour's frame, or else those that share the most folders with its topic."""
+    frame, topic = color.typical().frame, color.channel.topic
+
+    def near(depth: Candidate) -> tuple[bool, int]:
+        folders = (name.split("/")[:-1] for name in (depth.topic, topic))
+        return bool(frame) and depth.typical.frame == frame, len(commonprefix([*folders]))
+
+    most = max(map(near, depths))
+    return [depth for depth in depths if near(depth) == most]
 
 
 def _beside(info: str, image: str) -> bool:

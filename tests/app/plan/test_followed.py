@@ -73,20 +73,21 @@ def recorded(tmp_path_factory):
 
 
 def test_a_robot_that_follows_the_plan_makes_a_recording_that_check_accepts(recorded) -> None:
-    from app.preflight.check import look_at
+    from app.preflight.check import band_of, look_at
 
     path, plan, params, truth = recorded
     np.testing.assert_allclose(
         Rotation.from_quat(plan.hand).as_matrix(), (BASE[0].inv() * HAND).as_matrix(), atol=1e-9
     )
-    report = look_at(path, params).report
+    report = look_at(path, params, band_of(params)).report
     assert report.usable, report.problem
     assert report.signals.release_s == pytest.approx(truth.release, abs=1e-3)
     assert report.signals.draw_m == pytest.approx([0, -0.4, 0], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_robot_that_pulls_twice_makes_two_recordings_in_one_file(recorded, tmp_path) -> None:
-    from app.preflight.check import look_at
+    from app.preflight.check import band_of, look_at
 
     plan = plan_recording(recorded[2], "band1", pulls=2)
     way, path = plan.trajectory, tmp_path / "twice.mcap"
@@ -95,7 +96,7 @@ def test_a_robot_that_pulls_twice_makes_two_recordings_in_one_file(recorded, tmp
     releases = [time + 3e-4 for name, time in begins if name == "release"]
     moments = tuple(zip(grasps, releases, strict=True))
     write_bag(path, Repeated(end=way.duration, draw=0.4, way=way, moments=moments))
-    report = look_at(path, recorded[2], pull=2).report
+    report = look_at(path, recorded[2], band_of(recorded[2]), pull=2).report
     assert plan.content()["pulls"] == len(report.pulls) == 2
     assert all(pull.usable for pull in report.pulls), str(report.pulls)
     assert [pull.release_s for pull in report.pulls] == pytest.approx(releases, abs=1e-3)

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from app.preflight.check import Look, look_at
+from app.preflight.check import Look, band_of, look_at
 from pipeline.params import Params
 from pipeline.params.lab import BandParams
 from pipeline.recording.build import Checked
@@ -18,14 +18,14 @@ __all__ = ["blind", "masked", "params", "seen"]
 PROCESSED: dict[str, Checked] = {}
 
 
-def processed_once(pull: Pull, band: BandParams, params: Params) -> Checked:
+def processed_once(pull: Pull, band: BandParams, params: Params, weighed: bool) -> Checked:
     """`Checked.of`, which for equal pulls of a file is worked out once in all these tests."""
     if params.cloud.mask == "folder":  # the masks may be others
-        return Checked.of(pull, band, params)
+        return Checked.of(pull, band, params, weighed)
     settings = params.model_dump(exclude={"run", "bands"})
-    key = repr((pull.recording.path, pull.recording.sha256, pull.number, band, settings))
+    key = repr((pull.recording.path, pull.recording.sha256, pull.number, band, settings, weighed))
     if key not in PROCESSED:
-        PROCESSED[key] = Checked.of(pull, band, params)
+        PROCESSED[key] = Checked.of(pull, band, params, weighed)
     return PROCESSED[key]
 
 
@@ -54,10 +54,10 @@ def project(tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def looked(seen, params) -> Look:
     """A recording that can be used."""
-    return look_at(seen[0], params)
+    return look_at(seen[0], params, band_of(params))
 
 
 @pytest.fixture(scope="session")
 def refused(blind, params) -> Look:
     """A recording whose pictures show no band."""
-    return look_at(blind[0], params)
+    return look_at(blind[0], params, band_of(params))

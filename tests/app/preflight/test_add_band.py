@@ -22,6 +22,7 @@ def test_a_band_is_added_and_nothing_else_changes(project, seen, blind) -> None:
     assert message[0] == "red added, 1 pull"
     assert message[1].startswith("  seen.mcap: peak force")
     assert any("pictures come at 15 Hz" in line for line in message[2:])  # what costs accuracy
+    assert message[-1] == "  assumed: --diameter 0.01 and --rest-length 0.52"
     after = (project / "params.yaml").read_text().splitlines()
     lines = [x for x in difflib.ndiff(before, after) if x[0] in "+-"]
     assert len([x for x in lines if x[0] == "-"]) == 1  # run.own

@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from app.preflight.check import ASSUMED, band_of, look_at
+from app.preflight.check import band_of, look_at
 from app.preflight.command import check
 from app.preflight.facts import BandFacts
 from app.preflight.report import CheckReport
@@ -14,7 +14,17 @@ from pipeline.base.errors import UserError, printable
 from pipeline.recording.checks.finding import Finding
 from tests.hostile import MARKUP
 from tests.project import with_
-from validation.recordings.bag import RADIUS, START, Truth, blind_bag, edit, head, write_bag
+from validation.recordings.bag import (
+    HAND,
+    RADIUS,
+    SENSOR,
+    START,
+    Truth,
+    blind_bag,
+    edit,
+    head,
+    write_bag,
+)
 
 
 def abouts(report) -> set[str]:
@@ -33,7 +43,9 @@ def test_the_report_of_a_good_recording(looked, seen) -> None:
     assert signals["peak_force_n"] == pytest.approx(peak, rel=0.02)
     assert content["cloud"]["taut_coverage"] > 0.9
     assert content["cloud"]["taut_offset_m"] == pytest.approx(RADIUS, abs=0.002)
-    assert content["band"] == {"diameter_m": 0.010, "rest_length_m": 0.52, "source": ASSUMED}
+    sizes = {"diameter_m": 0.010, "rest_length_m": 0.52, "mass_kg": None}
+    source = "assumed: --diameter 0.01 and --rest-length 0.52; give yours, or --band"
+    assert content["band"] == sizes | {"source": source}
     roles = {row["role"]: row for row in content["topics"] if row["role"]}
     assert {"wrench", "pose", "gripper", "color", "depth"} <= set(roles)
     assert roles["wrench"]["topic"] == "/ft/wrench" and roles["wrench"]["why"]
@@ -54,7 +66,10 @@ def test_the_verdict_and_its_cautions_come_first(looked) -> None:
         assert lines[basis + 2].startswith("  motion: loading 25 to 38 cm at 0.23 m/s, pause ")
         assert lines[basis + 3].startswith("  not in it, so known by a prior alone: softening and")
         assert lines[basis + 4].startswith("  pictures: the band is in ")
-        assert lines[basis + 5].endswith(f"0.52 m long, {ASSUMED}")
+        assert "0.52 m long, assumed: --diameter 0.01 and --rest-length" in lines[basis + 5]
+        assert lines[basis + 6].startswith(
+            "  no mass given, so its weight and the force's direction"
+        )
         assert basis < lines.index("signals") < lines.index("chosen")
     pulls = [replace(looked.report.row, number=number) for number in (1, 2)]
     lines = replace(looked.report, pulls=pulls, cautions=cautions).to_text().splitlines()
@@ -79,7 +94,7 @@ def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
 
     path = tmp_path / "poor.mcap"
     write_bag(path, Truth(noise=0.6), rate=500, without=("gripper",), change=edit(wrench=lose))
-    report = look_at(path, with_(params, "setup", max_force=15.0)).report
+    report = look_at(path, with_(params, "setup", max_force=15.0), band_of(params)).report
     assert report.usable and report.verdict == "can be used, but:"
     output = {"gripper", "picture_rate", "force_rate", "gap", "pause", "max_force", "noise"}
     assert output <= abouts(report)
@@ -95,7 +110,7 @@ def test_a_clock_ahead_is_shown_with_its_sign(tmp_path, params) -> None:
         message.header = head(stamp + 200_000_000, message.header.frame_id)
 
     path = blind_bag(tmp_path, change=edit(pose=ahead))
-    rows = {row.role: row for row in look_at(path, params).report.topics}
+    rows = {row.role: row for row in look_at(path, params, band_of(params)).report.topics}
     assert rows["pose"].clock_offset == pytest.approx(0.2, abs=0.001)
     assert rows["wrench"].clock_offset == 0
     assert rows["depth"].clock_offset == pytest.approx(-0.0155, abs=0.001)  # it takes a while
@@ -119,7 +134,7 @@ def test_a_disk_that_is_full_is_one_line(seen, params, tmp_path, monkeypatch) ->
 
 def test_the_report_of_a_bad_recording(tmp_path, params) -> None:
     path = blind_bag(tmp_path, without=("wrench",))
-    report = look_at(path, params).report
+    report = look_at(path, params, band_of(params)).report
     assert not report.usable
     assert "no force" in json.loads(report.to_json())["problem"]
     assert "cannot be used: no force" in report.to_text()
@@ -134,19 +149,37 @@ def test_a_report_without_pictures_of_the_band_has_its_signals(refused, blind) -
 
 
 def test_the_band_of_a_command_line(params) -> None:
-    band, source = band_of(params, "band1", None, None)
-    assert band is params.bands["band1"] and "band1" in source
-    assert band_of(params, None, None, None) == (None, ASSUMED)
-    band, source = band_of(params, None, 0.008, None)
-    assert (band.diameter, band.rest_length) == (0.008, 0.52) and "--rest-length" in source
-    assert band_of(params, None, 0.008, 0.5)[1] == "given"
-    for arguments, words in (
-        (("red", None, None), "--band red: not in params.yaml, which has band1"),
-        (("band1", 0.01, None), "leave the other two out"),
-        ((None, None, 0.2), "--rest-length 0.2: must be longer"),
+    assert band_of(params, "band1").params is params.bands["band1"]
+    assert "band1" in band_of(params, "band1").source and band_of(params, "band1").weighed
+    assert not band_of(params).weighed
+    band = band_of(params, mass=0.2, diameter=0.008)
+    assert band.weighed and (band.params.mass, band.params.diameter) == (0.2, 0.008)
+    assert band.params.rest_length == 0.52 and "assumed: --rest-length 0.52" in band.source
+    assert band_of(params, diameter=0.008, rest_length=0.5).source == "given"
+    for sizes, words in (
+        ({"name": "red"}, "--band red: not in params.yaml, which has band1"),
+        ({"name": "band1", "diameter": 0.01}, "leave these out"),
+        ({"rest_length": 0.2}, "--rest-length 0.2: must be longer"),
     ):
         with pytest.raises(UserError, match=words):
-            band_of(params, *arguments)
+            band_of(params, **sizes)
+
+
+def test_without_a_mass_nothing_is_judged_by_one(tmp_path, params) -> None:
+    """A heavy band presses the hand down by half of its weight: no sensor is turned."""
+    truth, mass = Truth(), 0.3
+    weight = (HAND * SENSOR).inv().apply([0.0, 0.0, -9.81 * mass / 2])
+
+    def heavy(stamp: int, message) -> None:
+        if truth.holds((stamp - START) * 1e-9):
+            force = message.wrench.force
+            force.x, force.y, force.z = weight + [force.x, force.y, force.z]
+
+    path = blind_bag(tmp_path, change=edit(wrench=heavy))
+    for given, said in ((None, False), (mass, False), (0.03, True)):
+        report = look_at(path, params, band_of(params, mass=given)).report
+        assert ("direction" in abouts(report)) == said
+        assert ("no mass given" in report.to_text()) == (given is None)
 
 
 def test_outputs_are_refused_before_anything_is_read(tmp_path, params) -> None:
@@ -178,7 +211,7 @@ def test_the_whole_command(seen, params, tmp_path) -> None:
 def test_a_name_of_any_letters_has_nothing_that_a_terminal_obeys(name: str) -> None:
     """Also where an error names what lies beside the recording."""
     problem, written = f"{name}.masks: there is no such folder", [f"{name}.png: six moments"]
-    band = BandFacts(0.01, 0.5, "given")
+    band = BandFacts(0.01, 0.5, "given", 0.03)
     lines = CheckReport(name, "", problem, [], [], band=band, written=written).to_text().split("\n")
     assert all(line.isprintable() for line in lines)
     shown = printable(name)

@@ -59,7 +59,9 @@ def test_a_refused_recording_shows_what_it_has(with_rerun, refused, params, tmp_
 
 
 def test_nothing_to_show_is_said(with_rerun, params, tmp_path) -> None:
-    look = Look(CheckReport("x.mcap", "", "no force", [], [], band=BandFacts(0.01, 0.5, "given")))
+    look = Look(
+        CheckReport("x.mcap", "", "no force", [], [], band=BandFacts(0.01, 0.5, "given", 0.03))
+    )
     for function, name in ((draw_sheet, "a.png"), (write_timeline, "a.rrd")):
         assert "nothing in the recording" in function(look, params, tmp_path / name)
     assert not list(tmp_path.iterdir())

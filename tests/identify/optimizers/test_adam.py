@@ -2,7 +2,7 @@
 
 import numpy as np
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.identify.optimizers.adam.adam import Adam
@@ -22,7 +22,6 @@ def begun(population: int = 6, **settings) -> Adam:
     return optimizer
 
 
-@settings(deadline=None, max_examples=30)
 @given(place=st.lists(st.floats(0, 1), min_size=D, max_size=D), step=st.floats(1e-4, 0.02))
 def test_its_gradient_is_the_functions(place: list[float], step: float) -> None:
     """To the error of a forward difference, step times half the curvature, at the faces too."""

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import differential_evolution
 
@@ -29,7 +29,6 @@ def left() -> list[threading.Thread]:
     return threads()
 
 
-@settings(deadline=None, max_examples=20)
 @given(
     dimension=st.integers(1, 6),
     population=st.integers(5, 30),

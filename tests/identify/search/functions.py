@@ -56,7 +56,7 @@ class Evaluate:
         terms = {name: np.where(failed, np.nan, value) for name in TERMS}
         total = np.where(failed, np.inf, self.loss.total(terms))
         failure = ["no" if bad else None for bad in failed]
-        return Evaluation(unit, self.box.to_physical(unit), terms, total, failure, seconds=1.0)
+        return Evaluation(unit, self.box.to_physical(unit), terms, total, failure)
 
 
 def quadratic(centre: np.ndarray, matrix: np.ndarray, **more) -> Evaluate:

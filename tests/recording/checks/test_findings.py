@@ -188,13 +188,6 @@ def test_lost_and_rare_messages_are_said(checked) -> None:
     assert "picture_rate" in message("depth", number % 2 == 0)
 
 
-@pytest.mark.fires("topics")
-def test_another_topic_that_would_do_is_said(checked) -> None:
-    doubts = {"wrench": "/left/wrench would do as well"}
-    (message,) = roles.findings(with_recording(checked, doubts=doubts))
-    assert message.about == "topics" and message.what.endswith("but /left/wrench would do as well")
-
-
 @pytest.mark.fires("gripper")
 def test_a_gripper_that_was_not_recorded_is_said(checked) -> None:
     assert not list(roles.findings(checked))

@@ -55,18 +55,6 @@ def joints(topic: str, names: list[str], positions: np.ndarray) -> Channel:
     return channel(topic, "sensor_msgs/msg/JointState", messages)
 
 
-def twist(topic: str, frame: str = "base") -> Channel:
-    linear = np.stack([0.1 * np.cos(TIMES), 0.2 + 0 * TIMES, -0.2 * TIMES], axis=1)
-    messages = [
-        {
-            **head(k, frame),
-            "twist": {"linear": dict(zip("xyz", row, strict=True)), "angular": FORCE},
-        }
-        for k, row in enumerate(linear)
-    ]
-    return channel(topic, "geometry_msgs/msg/TwistStamped", messages)
-
-
 def picture(topic: str, encoding: str, frame: str, width: int = 4, height: int = 2) -> Channel:
     size = {"rgb8": 3, "bayer_rggb8": 1, "16UC1": 2, "mono16": 2}[encoding]
     fields = {"height": height, "width": width, "step": size * width, "encoding": encoding}
@@ -102,7 +90,7 @@ def played(choice) -> tuple[str, np.ndarray]:
     stamps = np.array([sample.stamp for sample in samples])
     np.testing.assert_array_equal(stamps, 5_000_000_000 + np.round(1e9 * TIMES))
     values = np.array([sample.value for sample in samples])
-    return samples[0].frame, choice.convert(stamps, values) if choice.convert else values
+    return samples[0].frame, choice.convert(values) if choice.convert else values
 
 
 def assert_poses(poses: np.ndarray, atol: float = 1e-9) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.base.errors import UserError
@@ -44,7 +44,6 @@ def stall(log: np.ndarray, at: float, seconds: float) -> np.ndarray:
     return np.maximum.accumulate(late)
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
 @given(
     rate=st.sampled_from([15.0, 30.0, 50.0, 200.0, 1000.0]),
     seed=st.integers(0, 999),

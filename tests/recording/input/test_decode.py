@@ -18,7 +18,6 @@ from pipeline.base.errors import UserError
 from pipeline.recording.input.contents import Channel
 from pipeline.recording.input.decode import Unreadable, decoder
 from pipeline.recording.input.readings import read_wrench
-from pipeline.recording.input.standard import guessed
 
 NAME = "geometry_msgs/msg/WrenchStamped"
 MSG = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(NAME, ros_version=2)[0]
@@ -183,14 +182,6 @@ def test_types_of_others_do() -> None:
     ):
         with pytest.raises(UserError):
             decoder(channel(name, encoding, data, "cdr"))
-
-
-def test_without_any_schema_bytes_tell_the_type() -> None:
-    assert guessed("/ft", "cdr", [cdr()] * 3).name == NAME
-    assert guessed("/twist", "cdr", [cdr()] * 3).name == "geometry_msgs/msg/TwistStamped"
-    assert guessed("/ft", "cdr", [cdr(), cdr() + bytes(8), cdr()]) is None
-    assert guessed("/ft", "json", [b"{}"]) is None and guessed("/ft", "cdr", []) is None
-    assert guessed("/ft", "cdr", [b"\0\1\0\0" + bytes(7)] * 3) is None
 
 
 def test_messages_that_are_packed_one_by_one() -> None:

@@ -1,4 +1,4 @@
-"""Forward kinematics against yourdfpy and a Denavit-Hartenberg table; twists against a helix."""
+"""Forward kinematics against yourdfpy and a Denavit-Hartenberg table."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
 from pipeline.recording.input import kinematics
-from pipeline.recording.input.kinematics import chain_of, integrated
+from pipeline.recording.input.kinematics import chain_of
 
 MIXED = """<robot name="mixed">
   <link name="world"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
@@ -135,34 +135,3 @@ def test_a_bad_urdf_is_one_line(folder, text, tip, words) -> None:
     with pytest.raises(UserError, match=words) as caught:
         chain_of("bad.urdf", tip)
     assert "\n" not in str(caught.value)
-
-
-def test_a_twist_along_a_helix() -> None:
-    """Constant turn about z while the velocity's direction turns: a circle that climbs."""
-    stamps = np.arange(0, 3_000_000_000, 1_000_000)
-    t, rate, radius, climb = stamps * 1e-9, 1.3, 0.2, 0.05
-    twists = np.zeros((len(t), 6))
-    twists[:, 0] = -radius * rate * np.sin(rate * t)
-    twists[:, 1] = radius * rate * np.cos(rate * t)
-    twists[:, 2] = climb
-    twists[:, 5] = rate
-    start = Rotation.from_euler("xyz", [0.4, 0.5, 0.6])
-    poses = integrated(stamps, twists, (1.0, 2.0, 3.0, *start.as_quat()))
-    circle = radius * np.stack([np.cos(rate * t) - 1, np.sin(rate * t)], axis=1)
-    np.testing.assert_allclose(poses[:, :2], circle + [1, 2], atol=1e-6)
-    np.testing.assert_allclose(poses[:, 2], 3 + climb * t, atol=1e-9)
-    expected = Rotation.from_euler("z", rate * t[:, None]) * start
-    off = (expected.inv() * Rotation.from_quat(poses[:, 3:])).magnitude()
-    assert off.max() < 1e-9
-
-
-def test_turns_that_do_not_commute_come_in_their_order() -> None:
-    """Quarter turns about x, then about y, of the base's axes."""
-    stamps = np.array([0, 1, 2, 3, 4]) * 10**9
-    quarter = np.pi / 2
-    twists = np.zeros((5, 6))
-    twists[1, 3] = quarter  # trapezoids: half of it in the second before, half in the one after
-    twists[3, 4] = quarter
-    poses = integrated(stamps, twists, (0, 0, 0, 0, 0, 0, 1))
-    expected = Rotation.from_euler("y", quarter) * Rotation.from_euler("x", quarter)
-    assert (expected.inv() * Rotation.from_quat(poses[-1, 3:])).magnitude() < 1e-12

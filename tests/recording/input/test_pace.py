@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.recording.input import pace
@@ -16,7 +16,6 @@ def samples(count: int = 4000, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     return 10**18 + np.arange(count) * MS, random.normal(size=(count, 3))
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
 @given(
     size=st.integers(2, 40),
     width=st.sampled_from([0, 8_000, 60_000]),
@@ -51,7 +50,6 @@ def test_a_coarse_clock_is_spread_behind_its_ticks(tick) -> None:
     assert np.abs(even - true)[tick:-tick].max() < MS
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
 @given(
     rate=st.sampled_from([30.0, 100.0, 1000.0]),
     jitter=st.floats(0, 0.3),
@@ -73,7 +71,6 @@ def test_doubled_messages_are_no_bursts() -> None:
     assert pace.without_bursts(twice, twice + 1000, np.repeat(values, 2, axis=0)) is None
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
 @given(times=st.integers(2, 60), jitter=st.floats(0, 0.2), rests=st.booleans())
 def test_held_values_are_taken_once(times, jitter, rests) -> None:
     """Also of a hand that rests, without noise, half of the time."""

@@ -9,7 +9,6 @@ import pytest
 from mcap.records import Schema
 from mcap_ros2._dynamic import serialize_dynamic
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
 from pipeline.recording.input import kinematics
@@ -30,7 +29,6 @@ from tests.recording.input.messages import (
     played,
     pose,
     pose_fields,
-    twist,
     wrench,
 )
 from validation.recordings.small import STATE, STATE_FIELDS
@@ -168,24 +166,6 @@ def test_arm_and_gripper_that_share_a_topic(params, gantry) -> None:
             roles[role].read(payload)
 
 
-def test_a_twist_alone_from_a_start_pose(params) -> None:
-    start = (*PLACES[0], 0, 0, 0, 1)
-    roles = chosen(params, wrench("/ft"), twist("/ee_twist"), start_pose=start)
-    frame, values = played(roles["pose"])
-    assert frame == "base"
-    np.testing.assert_allclose(values[:, :3], PLACES, atol=1e-5)
-    turned = Rotation.from_rotvec(np.outer(TIMES, [1, 2, 3]))
-    assert (turned.inv() * Rotation.from_quat(values[:, 3:])).magnitude().max() < 1e-9
-    assert roles["twist"].channel.topic == "/ee_twist"
-
-
-def test_a_twist_beside_a_pose_is_a_role_of_its_own(params) -> None:
-    roles = chosen(params, wrench("/ft"), pose(), twist("/ee_twist"))
-    assert roles["pose"].channel.topic == "/arm/current_pose"
-    np.testing.assert_array_equal(played(roles["twist"])[1][:, 3:], [[1, 2, 3]] * COUNT)
-    assert "twist" not in chosen(params, wrench("/ft"), pose(), twist("/cmd/twist"))
-
-
 @pytest.mark.parametrize(
     ("channel", "setup", "words"),
     [
@@ -193,8 +173,6 @@ def test_a_twist_beside_a_pose_is_a_role_of_its_own(params) -> None:
         (joints("/js", ["x", "y"], PLACES[:, :2]), GANTRY_URDF, "/js lacks joint z, rz, ry, rx of"),
         (joints("/js", ["finger"], PLACES[:, :1]), {}, "the file has .*/js .JointState"),
         (joints("/js", ["x"], PLACES[:, :1]), {"urdf": "no.urdf"}, "no.urdf: cannot be read"),
-        (twist("/tw"), {}, "/tw has a twist: give the hand's pose .* in setup.start_pose"),
-        (twist("/tw", "hand_tcp"), {"start_pose": (0,) * 6 + (1,)}, "along the axes of the hand"),
     ],
 )
 def test_a_missing_pose_says_what_would_do(params, gantry, channel, setup, words) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from mcap.records import Schema
 
@@ -13,10 +14,12 @@ from pipeline.recording.input.topics import camera_of
 from tests.recording.input.messages import (
     CAMERA,
     PLACES,
+    TIMES,
     chosen,
     info,
     joints,
     picture,
+    played,
     pose,
     wrench,
 )
@@ -41,6 +44,48 @@ def test_the_measured_one_of_several(params) -> None:
     assert roles["pose"].channel.topic == "/arm/ee_pose"
     assert roles["color"].why == "the only Image for colour images"
     assert list(roles) == ["wrench", "pose", "color", "depth", "color_info", "depth_info"]
+
+
+def test_where_several_topics_would_do_one_line_lists_them(params) -> None:
+    """Also of two arms: who pulled the band is not guessed; what is named is taken."""
+    arms = [
+        make(f"/{side}/{make.__name__}") for side in ("left", "right") for make in (wrench, pose)
+    ]
+    words = (
+        "several topics would do: setup.topics.wrench /left/wrench, /right/wrench;"
+        " setup.topics.pose /left/pose, /right/pose: name those that are meant in params.yaml"
+    )
+    with pytest.raises(UserError) as caught:
+        chosen(params, *arms)
+    assert str(caught.value) == words
+    topics = {"wrench": "/right/wrench", "pose": "/right/pose"}
+    roles = chosen(params, *arms, topics=topics)
+    assert {role: roles[role].channel.topic for role in topics} == topics
+    webcam = picture("/webcam/rgb", "rgb8", "webcam"), info("/webcam/camera_info", "webcam")
+    one_arm = wrench("/ft"), pose()
+    with pytest.raises(UserError, match="setup.topics.color /cam/color/image, /webcam/rgb: name"):
+        chosen(params, *one_arm, *webcam)
+    packed = replace(CAMERA[0], topic="/cam/color/image/compressed")  # one picture, sent twice
+    assert "color" in chosen(params, *one_arm, packed)
+
+
+def test_fingers_of_any_sign_and_of_two_hands(params) -> None:
+    closing = 0.04 - 0.03 * (TIMES > 1.0)
+    other = 0.04 - 0.035 * (TIMES > 0.5)
+    for positions, wanted in (
+        ({"left_finger": closing, "right_finger": closing}, 2 * closing),
+        ({"left_finger": closing, "right_finger": -closing}, 2 * closing),
+        ({"a_finger": closing, "b_finger": 0 * TIMES}, closing),
+        ({"joint1": other, "finger_joint": closing}, closing),
+        ({"finger": 0 * TIMES}, 0 * TIMES),
+    ):
+        fingers = joints("/joints", list(positions), np.stack([*positions.values()], axis=1))
+        roles = chosen(params, wrench("/ft"), pose(), fingers)
+        np.testing.assert_allclose(played(roles["gripper"])[1][:, 0], wanted)
+    hands = joints("/joints", ["a_finger", "b_finger"], np.stack([closing, other], axis=1))
+    choice = chosen(params, wrench("/ft"), pose(), hands)["gripper"]
+    with pytest.raises(UserError, match="/joints: the joints a_finger, b_finger do not move as"):
+        played(choice)
 
 
 def test_sixteen_grey_bits_are_depth_where_the_name_says_so(params) -> None:

@@ -1,9 +1,15 @@
-"""Names of files in pictures are drawn letter by letter."""
+"""Names of files in texts and pictures: what is in them is shown, and does nothing."""
+
+import re
+from html import unescape
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
 
-from pipeline.report.drawing.names import as_label
+from pipeline.base.errors import printable
+from pipeline.report.drawing.names import as_code, as_label, cell
+from pipeline.report.drawing.page import page
 from tests.hostile import MARKUP
 
 TEX = "$\\frac{a$.mcap"
@@ -31,3 +37,23 @@ def test_tex_is_what_a_plain_name_would_be_read_as() -> None:
     long = plt.figure().text(0, 0, "a$b")
     assert short.get_window_extent().width > long.get_window_extent().width
     plt.close("all")
+
+
+@pytest.mark.parametrize("name", MARKUP)
+def test_a_name_is_shown_letter_by_letter(name: str, tmp_path: Path) -> None:
+    table = f"| a | b |\n| --- | --- |\n| {cell(as_code(name))} | 1 |\n"
+    html = page(f"# Card\n\n## Values\n\n- {as_code(name)}\n\n{table}", tmp_path, "A title")
+    body = html[html.index("<main>") :]
+    shown = [unescape(text) for text in re.findall("<code>(.*?)</code>", body, re.DOTALL)]
+    assert shown == [printable(name)] * 2
+    assert set(re.findall("<([a-z0-9]+)", body)) <= {
+        *("main", "h1", "h2", "ul", "li", "code"),
+        *("table", "thead", "tbody", "tr", "th", "td"),
+    }
+    assert body.count("<td>") == 2
+
+
+def test_markup_that_is_not_code_would_be_obeyed(tmp_path: Path) -> None:
+    """So the test above can fail; HTML in a text never counts."""
+    html = page("## **a** <script>alert(1)</script>", tmp_path, "A title")
+    assert "<strong>a</strong>" in html and "<script" not in html

@@ -18,6 +18,7 @@ from pipeline.report.run.results import Result, Results, gather
 from pipeline.simulator.parameters import THETA as NAMES
 from tests.policy.stored import write_stored
 from tests.project import DEFAULTS, write_params_of
+from tests.report.run import toy_launches
 from tests.report.run.toy_replay import toy_landscape, toy_replay
 
 BAND, METHOD = "toy", "sling2sim2real"
@@ -62,18 +63,13 @@ def history(phase: str, totals: list[float], solver: int | None = None) -> pd.Da
 
 
 def launches() -> pd.DataFrame:
-    rows = pd.DataFrame(
-        [(1.725, 1.745), (1.725, 1.695), (1.925, 1.965), (2.125, None)],
-        columns=["target", "landing_y"],
-    )
-    failure = [None, None, None, "did not land"]
-    return rows.assign(
-        band=BAND, method=METHOD, kind="measured", policy=None, trial=[1, 2, 1, 1],
-        draw_y=-0.3, draw_z=-0.2, hold_force=9.0, failure=failure, flight_y=None, flight_z=None,
-        stretch=[1.4, 1.4, 1.7, 1.8], recorded_stretch=1.63, predicted_y=rows.target,
-        predicted_failure=None, predicted_speed=4.5, predicted_angle=0.5,
-        predicted_leave_y=-0.05, predicted_leave_z=-0.03,
-        predicted_low=rows.target - 0.025, predicted_high=rows.target + 0.025,
+    """Of BAND by METHOD, measured: two inside the recorded stretch, two beyond; one is lost."""
+    targets = np.array([1.725, 1.725, 1.925, 2.125])
+    return toy_launches.launches(
+        [[0.02], [-0.03], [0.04], [np.nan]], "measured", targets, band=BAND, method=METHOD,
+        trial=[1, 2, 1, 1], failure=[None, None, None, "did not land"],
+        stretch=[1.4, 1.4, 1.7, 1.8], recorded_stretch=1.63, predicted_y=targets,
+        predicted_low=targets - 0.025, predicted_high=targets + 0.025,
     )  # fmt: skip
 
 

@@ -10,7 +10,6 @@ from matplotlib.patches import Ellipse
 
 from pipeline.report.drawing import canvas
 from pipeline.report.drawing.styles import styles
-from pipeline.report.quantities import coordinate
 from pipeline.report.run.figures import confidence, landings, policy, search
 from pipeline.report.run.figures.pull import pull
 from tests.report.run.conftest import BAND, METHOD, episode, launches
@@ -225,9 +224,3 @@ def test_correlations_are_written_into_half_of_their_cells(retained, result) -> 
     np.testing.assert_array_equal(image.get_array(), result.confidence["correlation"]["matrix"])
     assert [(t.get_position(), t.get_text()) for t in first.texts] == [((0, 1), "−0.9")]
     assert METHOD not in first.get_title()
-
-
-def test_coordinates_have_words() -> None:
-    names = "log_youngs_modulus", "mooney_share", "log_loss_factor"
-    words = ["log E", "Mooney share", "log loss factor"]
-    assert [coordinate(name) for name in names] == words

@@ -9,8 +9,6 @@ import pytest
 from pipeline.identify.objective.box import SearchBox
 from pipeline.report.run.tables.cells import markdown
 from pipeline.report.run.tables.landings import (
-    Coverage,
-    intervals,
     landing_errors,
     prediction_error,
     predictions,
@@ -73,38 +71,6 @@ def test_prediction_error_inside_and_beyond() -> None:
     assert error["inside"].unpredicted == 0
     text = markdown(predictions(launched))
     assert "+5.0%" in text and "−10.0%" in text and text.count("(beyond)") == 2
-
-
-def test_predictions_are_held_against_landings_outside_the_area_too() -> None:
-    """A launch that came down there has failed its target, but not escaped its prediction."""
-    for kind, failure in (("virtual", "beyond the area: lands at 2.600 m"), ("measured", None)):
-        launched = trials([(1.9, 2.0, None, 2.1, 1.4), (1.9, 2.6, failure, 1.95, 1.4)], kind)
-        launched = launched.assign(predicted_low=1.9, predicted_high=2.2)
-        error, inside = prediction_error(launched)["all"], intervals(launched)["inside"]
-        assert error.launches == 2 and error.max == pytest.approx(0.25)
-        assert (inside.launches, inside.covered) == (2, 1)
-        total = landing_errors(launched)["all"]
-        assert total.failed == 1 and total.mean == pytest.approx(0.1)
-
-
-def test_coverage_of_the_predicted_intervals() -> None:
-    launched = trials(
-        [
-            (math.nan, 2.0, None, 2.1, 1.4),
-            (math.nan, 2.0, None, 2.1, 1.5),
-            (math.nan, math.nan, "fell", 2.1, 1.5),  # nothing to cover
-            (math.nan, 4.0, None, 3.6, 1.7),  # beyond
-        ]
-    )
-    assert intervals(launched) is None
-    ranged = launched.assign(
-        predicted_low=[1.95, 2.05, 1.0, 3.0], predicted_high=[2.25, 2.15, 3.0, 4.0]
-    )
-    parts = intervals(ranged)
-    assert (parts["inside"].covered, parts["inside"].launches) == (1, 2)
-    assert parts["inside"].width == pytest.approx((0.15 + 0.05) / 2)
-    assert parts["beyond"] == Coverage(launches=1, covered=1, width=0.25)
-    assert "| 1.950 – 2.250 |" in markdown(predictions(ranged))
 
 
 def test_edge_of_the_box_on_both_scales() -> None:

@@ -33,6 +33,7 @@ def run(tmp_path: Path, monkeypatch):
     return floor_of
 
 
+@pytest.mark.slow
 def test_a_target_out_of_reach_has_no_floor(run, capsys) -> None:
     both = run()
     assert both["failed"] == 0 and capsys.readouterr().err == ""

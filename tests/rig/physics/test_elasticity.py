@@ -148,10 +148,3 @@ def test_the_extended_tube_is_kaliskes_energy() -> None:
         chains = (1 - e2) * d / (1 - e2 * d) + np.log(1 - e2 * d)
         tubes = 2 * share * shear / b**2 * np.sum(stretches**-b - 1)
         assert np.isclose(float(law.energy(np.array(stretch))), shear / 2 * chains + tubes)
-
-
-def test_ogden_of_one_term_is_the_neo_hookean_law() -> None:
-    stretch = np.linspace(0.5, 3, 20)
-    stress = law_of("ogden", (0.4, 2.0)).stress(stretch)[0]
-    np.testing.assert_allclose(stress, 0.4 * (stretch - stretch**-2), atol=1e-12)
-    assert law_of("gent", (50.0,)) == law_of("gent", (50.0, law_of("gent").constants[1]))

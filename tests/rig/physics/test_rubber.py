@@ -191,25 +191,6 @@ def test_a_closed_cycle_costs_work(kind: str) -> None:
     assert abs(again) < 1e-9 if kind.startswith("softening") else again > 1e-2
 
 
-@pytest.mark.parametrize("kind", ["flowing", "softening", "softening by strain"])
-def test_work_is_what_is_stored_and_what_is_lost(kind: str) -> None:
-    """Loss: s sigma e' of the flow; of softening, by the growth of the largest energy alone."""
-    rubber = KINDS[kind]
-    times = np.linspace(0, 4, 20001)
-    stretch = 1.4 - 0.4 * np.cos(np.pi * times)
-    stresses, memory = followed(rubber, lambda time: 1.4 - 0.4 * np.cos(np.pi * time), times)
-    work = cumulative_trapezoid(stresses, stretch, initial=0)
-    stored = rubber.stored(stretch, memory)
-    lost = work - (stored - stored[0])
-    assert (np.diff(lost) > -1e-6).all() and lost[-1] > 0.01
-    if kind == "flowing":
-        elastic = stretch / np.exp(memory[:, 0])
-        power = FLOW.share * elastic * stress(elastic) * rubber.response(stretch, memory)[2][:, 0]
-        np.testing.assert_allclose(lost, cumulative_trapezoid(power, times, initial=0), atol=1e-5)
-    else:  # the second cycle loses nothing
-        assert np.isclose(lost[-1], lost[10000], atol=1e-5)
-
-
 def test_a_law_whose_energy_at_rest_is_rounded_below_zero_softens_by_strain() -> None:
     law = law_of("lopez_pamies", [0.3388, 0.717, 0.002875, 2.444])
     rubber = Rubber(1.0, NONE, 0.0, law, softening=STRAINED)
@@ -218,17 +199,3 @@ def test_a_law_whose_energy_at_rest_is_rounded_below_zero_softens_by_strain() ->
     memory = law.energy(stretch)[:, None]
     assert all(np.isfinite(array).all() for array in rubber.response(stretch, memory))
     assert np.isfinite(rubber.stored(stretch, memory)).all()
-
-
-def test_each_number_of_a_memory_counts() -> None:
-    times = np.linspace(0, 1, 201)
-    path = lambda time: 1.3 - 0.3 * np.cos(2 * np.pi * time)  # noqa: E731
-
-    def reaction(rubber: Rubber) -> np.ndarray:
-        return followed(rubber, path, times)[0]
-
-    for rubber, part in ((FLOWING, "flow"), (SOFT, "softening")):
-        plain, section = reaction(rubber), getattr(rubber, part)
-        for name in vars(section).keys() - {"lag", "strain"}:
-            other = replace(section, **{name: 1.5 * getattr(section, name)})
-            assert np.abs(reaction(replace(rubber, **{part: other})) - plain).max() > 1e-3, name

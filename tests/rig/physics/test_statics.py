@@ -1,9 +1,6 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from pipeline.params import Params
 from rig.physics import string as dynamics
 from rig.physics.world import bent_at, string_of
 
@@ -20,13 +17,3 @@ def test_a_held_band_rests_where_damped_motion_brings_it(coarse, monkeypatch, le
     monkeypatch.setattr(dynamics, "balanced", lambda *arguments: None)
     settled = string.at_rest(at, 1e-8, held=True, memory=memory)
     assert np.allclose(state, settled, atol=1e-6)
-
-
-def test_nothing_moves_it_any_more(params: Params) -> None:
-    string = string_of(params, "band3")
-    elastic = replace(string, rubber=replace(string.rubber, relaxation=np.empty((0, 2))))
-    nodes = elastic.balanced(bent_at(elastic, DRAW), np.empty(0), 1e-9)
-    state = elastic.state(nodes)
-    force = elastic.forces(state)
-    force[[0, elastic.middle, -1]] = 0.0
-    assert np.abs(force).max() < 1e-7 * np.linalg.norm(elastic.at_middle(state))

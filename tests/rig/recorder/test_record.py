@@ -96,32 +96,15 @@ def test_same_schemas_as_a_lab_writes(recorded: tuple[Path, Interaction], shared
     assert schemas(recorded[0]) == schemas(shared / "recordings" / "orange.mcap")
 
 
-def test_readable_by_rerun(recorded: tuple[Path, Interaction], tmp_path: Path) -> None:
-    """It finds no fault, and takes pictures, poses and cameras for what they are."""
+def test_rerun_finds_no_fault(recorded: tuple[Path, Interaction]) -> None:
+    """As docs/rig.md says, it opens the file itself."""
     pytest.importorskip("rerun", reason="rerun-sdk: pip install -e '.[rerun]'")
-
-    def rerun(*arguments: str | Path) -> str:
-        command = [sys.executable, "-m", "rerun", *map(str, arguments)]
-        done = subprocess.run(command, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
-    checked = [line.split() for line in rerun("mcap", "check", recorded[0]).splitlines()]
+    command = [sys.executable, "-m", "rerun", "mcap", "check", str(recorded[0])]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    checked = [line.split() for line in done.stdout.splitlines()]
     status = {words[3]: words[0] for words in checked if len(words) > 3 and "/" in words[3]}
     assert status == dict.fromkeys([*COUNTS, *PICTURES], "ok")
-    converted = tmp_path / "band1.rrd"
-    rerun("mcap", "convert", recorded[0], "-o", converted)
-    stats = rerun("rrd", "stats", converted)
-    for topic in (*COUNTS, *PICTURES):
-        assert f"\n{topic}: " in stats
-    for component in (
-        "EncodedImage:blob",
-        "InstancePoses3D:translations",
-        "Pinhole:image_from_camera",
-        "geometry_msgs.msg.WrenchStamped:message",
-        "Transform3D:translation",
-    ):
-        assert f"\n{component}: " in stats
 
 
 def response(messages: dict[str, list[Any]]) -> np.ndarray:
@@ -134,6 +117,7 @@ def response(messages: dict[str, list[Any]]) -> np.ndarray:
     return force - force[:900].mean(axis=0)
 
 
+@pytest.mark.slow
 def test_force_peaks_as_the_papers_and_the_same_seed_gives_the_same_bytes(
     coarse: Params, messages: dict[str, list[Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.simulator.parameters import Parameters
+from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.simulator import (
     agreement,
     at_rest,
@@ -33,7 +35,9 @@ CHECKS = {
         turn_damping=0.5,
         **rubber.law_parameters((0.5, 0.1), 0.04),
     ),
-    "growth of energy": lambda bench: growth(bench, band_of(bench), 4),
+    "growth of energy": lambda bench: damping.growth(
+        bench, band_of(bench), Parameters.of(NEO_HOOKEAN, agreement.random_thetas(bench, 4, 11))
+    ),
     "a heavy middle": lambda bench: damping.oscillator(bench, OSCILLATORS),
     "free fall": free_motion.free_fall,
     "momentum": free_motion.momentum,
@@ -49,7 +53,7 @@ CHECKS = {
     "rubber: the kernel's steps": lambda bench: agreement.checks(
         bench, 1, sling=rubber.rubber_of(bench), **rubber.law_parameters((-0.3, 0.2), 0.08)
     ),
-    "rubber: growth of energy": lambda bench: growth(bench, rubber.rubber_of(bench), 2),
+    "rubber: growth of energy": lambda bench: rubber.growth(bench, 4),
     "rubber: slack again": rubber.slack,
     "rubber: a launch's history": rubber.histories,
     "rubber: random points": lambda bench: rubber.survey(bench, 64),
@@ -57,11 +61,6 @@ CHECKS = {
         energy.balance(bench, sling=rubber.rubber_of(bench), **rubber.law_parameters())
     ),
 }
-
-
-def growth(bench, sling, count: int) -> list:
-    """Of random parameters of the sling's law."""
-    return damping.growth(bench, sling, rubber.random_points(bench, count, sling.law))
 
 
 def assert_kept(checks) -> None:

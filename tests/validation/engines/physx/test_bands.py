@@ -14,9 +14,8 @@ from pipeline.simulator.model import GRAVITY
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.engines import checks
+from validation.engines.checks import THETA
 from validation.engines.physx import bands, rollouts, scene
-
-THETA = np.array([2.2e5, 0.45, 3e-3, 1.0, 1.0])
 
 
 def test_the_scene_has_each_band_with_its_material(tube):

@@ -53,7 +53,7 @@ validate: setup       # slow campaigns, and tests by other engines and readers; 
 	.venv/bin/python -m pytest tests/validation/engines tests/validation/benchmarks tests/export tests/recording/masks \
 		tests/recording/input/test_kinematics.py tests/app/preflight/test_pictures.py \
 		tests/rig/recorder/test_record.py
-	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation tests/app/flow \
+	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation \
 		tests/recording/test_orange.py
 
 clean:                # all but data, .checkpoints and DVC's cache

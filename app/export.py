@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.flow.disk import expect_writable
+from pipeline.base.disk import expect_writable
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.export.card import HOLD, LANDING

@@ -9,15 +9,15 @@ import numpy as np
 
 from app import evidence, safety
 from app.command_line import say
-from app.flow import child
-from app.flow.disk import expect_ready
 from app.launch import expect_above_floor, interval_90
 from app.safety import Hazard
 from app.stretched import further
+from pipeline.base.disk import expect_ready
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, NotMade
 from pipeline.episode.episode import Episode
 from pipeline.episode.pull import deepest_draw
+from pipeline.flow.dvc import repro
 from pipeline.identify.results.theta import load_samples, load_theta, parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.trials.spread import LEVEL
@@ -121,7 +121,7 @@ def _place_and_stage(
 def _run(stage: str | None, layout: Layout) -> bool:
     """Have DVC run a stage; whether there was one. Raises UserError."""
     if stage:
-        child.repro(layout.root, stage, say, command="sling observe")
+        repro(layout.root, stage, say)
     return bool(stage)
 
 

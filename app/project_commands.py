@@ -33,35 +33,27 @@ def reset(arguments: argparse.Namespace) -> Done:
 
 
 @command(
-    "run all stale stages in parallel",
-    "--workers 2",
+    "run stale stages in parallel, as a flow of Prefect's",
+    "theta@band1-sling2sim2real --workers 2",
+    flag("targets", nargs="*", metavar="STAGE", help="or a step for all its stages; default: all"),
     flag(
         "--workers",
         type=kinds.count,
         metavar="N",
-        help="stages at a time; default: as many as cores",
+        help="stages at a time; default: as many as cores, 16 on a cluster",
     ),
     flag("--gpus", type=kinds.count, metavar="N", help="GPU stages at a time; default 1"),
-    flag("--cluster", type=kinds.address, metavar="ADDRESS", help="Dask, as tcp://10.0.0.5:8786"),
+    flag("--dask", type=kinds.address, metavar="ADDRESS", help="of a scheduler: its workers run"),
+    flag("--slurm", type=Path, metavar="FILE", help="of SLURM jobs, which run"),
 )
 def flow(arguments: argparse.Namespace) -> Done:
-    from app.flow import run as flow
+    from pipeline.flow.run import run
     from pipeline.params import load
 
-    if Path("stages").is_dir():  # whose scripts read params.yaml
+    if Path("params.yaml").exists():
         load()  # a mistake in it is reported once, and not by each of them
-    root, workers, gpus = Path.cwd(), arguments.workers, arguments.gpus
-    if arguments.cluster is None:
-        return flow.run(root, workers=workers, gpus=gpus)
-    from app.cluster.cluster import Cluster
-
-    with Cluster(root, arguments.cluster) as cluster:
-        return flow.run(
-            root,
-            workers=workers or cluster.slots,
-            gpus=gpus or cluster.slots,
-            place=cluster.run_stage,
-        )
+    options = {name: getattr(arguments, name) for name in ("workers", "gpus", "dask", "slurm")}
+    return run(Path.cwd(), arguments.targets, **options)
 
 
 @command(
@@ -70,6 +62,6 @@ def flow(arguments: argparse.Namespace) -> Done:
     flag("--port", type=kinds.count, metavar="N", help="default 4200"),
 )
 def ui(arguments: argparse.Namespace) -> Done:
-    from app.flow.server import serve
+    from pipeline.flow.server import PORT, serve
 
-    return serve(Path.cwd(), arguments.port)
+    return serve(Path.cwd(), arguments.port or PORT)

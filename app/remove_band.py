@@ -9,10 +9,9 @@ from pathlib import Path
 
 from ruamel.yaml.comments import CommentedMap
 
-from app.cluster.exchange import drop
 from app.command_line import say
-from app.flow.disk import expect_writable
 from app.params_file import edited
+from pipeline.base.disk import expect_writable
 from pipeline.base.errors import UserError, printable
 from pipeline.base.files import write_text
 from pipeline.base.layout import Layout
@@ -22,8 +21,8 @@ from pipeline.params import expect_known, load, parse
 def remove_band(name: str, agreed: Callable[[list[str]], bool], root: Path | str = ".") -> str:
     """Remove a recorded band from params.yaml, data/, reports/ and the checkpoints.
 
-    Killed, the same command goes on: params.yaml comes last. Entries of its stages leave dvc.lock.
-    DVC's cache keeps what it has: the same band brought in again is found in it.
+    Killed, the same command goes on: params.yaml comes last. dvc.lock and DVC's
+    cache keep what they have: the same band brought in again is found there.
 
     Args:
         name: Of the band.
@@ -53,7 +52,6 @@ def remove_band(name: str, agreed: Callable[[list[str]], bool], root: Path | str
     lines = [f"bands.{name} of {path}, and where run: names it", *map(str, files)]
     if not agreed(lines):
         raise UserError(f"{name}: is kept; with --yes nobody is asked")
-    drop(root, lambda stage: stage.partition("@")[2].partition("-")[0] == name)  # may refuse
     for file in files:
         shutil.rmtree(file) if file.is_dir() else file.unlink()
     write_text(path, text)

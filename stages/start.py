@@ -15,7 +15,6 @@ from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, NotMade, owner
 from pipeline.params import Params, expect_known, load
 from pipeline.params.identification import steps_of
-from stages import dvc_files
 
 MAKERS = {  # steps that make a folder of another name
     "raw": "record",
@@ -27,6 +26,7 @@ MAKERS = {  # steps that make a folder of another name
 OF_A_SEARCH = ("history", "clusters", "evaluations", "confidence")  # its last step writes the rest
 
 OF_DVC = "DVC_STAGE"  # in the environment of what DVC runs
+OF_FLOW = "SLING_FLOW"  # process id of the `sling` command that started that DVC
 OF_EXPERIMENT = "DVC_EXP_NAME"  # the same, of `dvc exp run`
 GRACE = 5.0  # s from the interrupt to the end
 
@@ -65,8 +65,6 @@ def run(main: Callable[[], int | None]) -> None:
     """Run a stage or a command: a mistake is one line, which says what makes a missing file."""
 
     def explained() -> int | None:
-        if OF_DVC in os.environ and any(dvc_files.half_files(Path())):
-            dvc_files.mend(Path())  # what a killed `dvc repro` has copied in part; DVC never does
         try:
             return main()
         except NotMade as error:
@@ -78,14 +76,15 @@ def run(main: Callable[[], int | None]) -> None:
 
 
 def _end_with_dvc() -> None:
-    """A stage whose DVC was killed would write beside the one that DVC starts next."""
+    """A stage whose DVC or flow was killed would write beside the one that DVC starts next."""
     import psutil
 
+    flow = int(os.environ.get(OF_FLOW) or os.getpid())
     try:
         outermost = psutil.Process()  # or the shell around us, if it stays
         while (dvc := outermost.parent()) and OF_DVC in dvc.environ():
             outermost = dvc
-        while dvc is None or outermost.ppid() == dvc.pid:
+        while (dvc is None or outermost.ppid() == dvc.pid) and psutil.pid_exists(flow):
             time.sleep(0.5)
     except psutil.AccessDenied:
         return

@@ -3,15 +3,12 @@
 import gc
 import os
 import signal
-import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 from pipeline.params import Params, load
-from tests import once
 from tests.project import DEFAULTS, ROOT
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as stages have it; nothing has imported NumPy yet
@@ -79,21 +76,6 @@ def delivered():
         patch.setattr(settings, "files", lambda package: DEFAULTS.parent)
         settings._defaults.cache_clear()
         yield
-
-
-@pytest.fixture(scope="session")
-def history(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Prefect's history, to be copied as a project's .prefect/: a new one takes it seconds."""
-
-    def make(folder: Path) -> None:
-        from app.flow import server
-
-        server.home(folder).mkdir()
-        code = "import asyncio; from prefect.server.database import provide_database_interface as d"
-        command = [sys.executable, "-c", f"{code}; asyncio.run(d().create_db())"]
-        subprocess.run(command, env=server.clean(folder), check=True)
-
-    return once.folder(tmp_path_factory, "prefect", make) / ".prefect"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from pipeline.base.errors import OF_THE_EXTRA
+from pipeline.base.errors import EXTRAS as TOLD
 from tests.project import ROOT, texts
 
 OURS = {
@@ -29,7 +29,7 @@ OURS = {
 }
 # By path, extras that come beside what everybody has.
 EXTRAS = {
-    "app/cluster/": "cluster",
+    "pipeline/flow/cluster.py": "cluster",
     "pipeline/export/mujoco_replay.py": "validation",
     "pipeline/export/newton_band.py": "validation",
     "app/preflight/timeline.py": "rerun",
@@ -176,7 +176,7 @@ main()
 
 def light(folder: Path, *words: str) -> subprocess.CompletedProcess:
     """`sling` in a folder, by a Python without what the extra `run` brings."""
-    script = LIGHT.format(absent=sorted(OF_THE_EXTRA), words=words)
+    script = LIGHT.format(absent=TOLD["run"].split(), words=words)
     return subprocess.run(
         [sys.executable, "-c", script],
         cwd=folder,
@@ -188,7 +188,7 @@ def light(folder: Path, *words: str) -> subprocess.CompletedProcess:
 
 @pytest.mark.slow
 def test_a_light_install_suffices_and_says_what_it_lacks(tmp_path: Path) -> None:
-    brought = {name for package in OF_THE_EXTRA for name in distributions(package)}
+    brought = {name for package in TOLD["run"].split() for name in distributions(package)}
     assert declared("run") <= brought
     assert not declared() & brought
     how = "make setup, or pip install '.[run]' -c constraints.txt in the project's folder"

@@ -11,11 +11,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+import networkx
 import pytest
 from numba.core.caching import UserProvidedCacheLocator
 from ruamel.yaml import YAML
 
-from app.flow.graph import Stage, leading_to, stages_of
+from pipeline.flow.dvc import graph_of
 from rig.physics import compiled
 from tests.project import ROOT, contents, until
 from validation.projects import TINY, MarkedRun, ProjectCopy, copy_project, run_of
@@ -83,17 +84,12 @@ class Copy(ProjectCopy):
         return changed
 
     @cached_property
-    def stages(self) -> list[Stage]:
-        """Producers first."""
-        return [*stages_of(self.folder).values()]
+    def graph(self) -> networkx.DiGraph:
+        return graph_of(self.folder)
 
     def after(self, names: Collection[str]) -> set[str]:
         """Stages that read what these make, and so on."""
-        dependents: set[str] = set()
-        for stage in self.stages:
-            if {*stage.producers} & {*names, *dependents}:
-                dependents.add(stage.name)
-        return dependents
+        return set().union(*(networkx.descendants(self.graph, name) for name in names))
 
 
 def share_compiled(copy: Path) -> None:
@@ -411,8 +407,8 @@ def test_a_change_makes_stale_what_depends_on_it(
 
 
 def test_a_band_of_ones_own_has_a_chain_by_the_first_method(project: Copy) -> None:
-    graph = {stage.name: stage for stage in project.stages}
-    assert {stage.name for stage in leading_to(graph, f"own_card@{OWN}")} == OWN_CHAIN
+    card = f"own_card@{OWN}"
+    assert {card, *networkx.ancestors(project.graph, card)} == OWN_CHAIN
 
 
 def test_launches_of_one_band_run_nothing_of_another(project: Copy) -> None:

@@ -2,11 +2,10 @@
 
 DVC re-runs a stage when something listed changes; it cannot see Python's imports. This follows what
 a stage's script imports, at any depth and inside functions too, and lists the folder of each such
-file: one folder a concern. Three things are nobody's dependency, for no result depends on them but
+file: one folder a concern. Two things are nobody's dependency, for no result depends on them but
 by the values in params.yaml, which DVC tracks by themselves: pipeline/params/, which holds no
-default, stages/start.py, which reads the arguments, and stages/dvc_files.py, which clears up.
-Optimisers are found by name, so that no import says which of them a stage runs: their folders are
-listed by hand.
+default, and stages/start.py, which reads the arguments. Optimisers are found by name, so that no
+import says which of them a stage runs: their folders are listed by hand.
 
     python tools/closure.py          # says what differs; exit status 1 if anything does
     python tools/closure.py --fix    # rewrite the code dependencies, comments kept

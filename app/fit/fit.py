@@ -11,17 +11,15 @@ from pathlib import Path
 
 from app import evidence
 from app.command_line import say
-from app.fit.countdown import Countdown
-from app.flow import child
-from app.flow.disk import expect_ready
-from app.flow.graph import leading_to, stages_of
 from app.params_file import edited
 from app.preflight.add_band import NAME, add_band
 from app.preflight.recordings import add_recording, digests, renew_masks
+from pipeline.base.disk import expect_ready
 from pipeline.base.errors import UserError, printable
 from pipeline.base.files import write_text
 from pipeline.base.launch_table import expect_apart, file_of
 from pipeline.base.layout import Layout
+from pipeline.flow.dvc import repro
 from pipeline.identify.posterior.evidence import read_evidence
 from pipeline.params import Params, load, parse
 from pipeline.recording.input.bag import name_of as name_of_file
@@ -87,17 +85,7 @@ def fit(
         count = evidence.add(layout, name, observed, "passed over")
         say(f"{layout.evidence / name}.csv: {count} launches as evidence")
     read_evidence(layout.evidence, name, params)
-    stages = leading_to(stages_of(root), card_stage)
-    countdown = Countdown(stages)
-    child.repro(
-        root,
-        card_stage,
-        countdown.line,
-        countdown.begins,
-        command="sling fit",
-        producers={stage.name: stage.producers for stage in stages},
-    )
-    countdown.ends()
+    repro(root, card_stage, say)
     card = layout.card(name)
     return json.loads((card / "card.json").read_text("utf-8")) | {"card": str(card / "README.md")}
 

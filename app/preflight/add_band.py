@@ -8,10 +8,10 @@ from pathlib import Path
 
 from ruamel.yaml.comments import CommentedMap
 
-from app.flow.disk import expect_writable
 from app.params_file import edited
 from app.preflight import recordings as files
 from app.sizes import DIAMETER, REST_LENGTH, assumed
+from pipeline.base.disk import expect_writable
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
 from pipeline.base.layout import Layout

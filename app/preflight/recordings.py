@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from app.flow.disk import expect_writable
 from app.preflight.check import GivenBand, look_at
 from app.preflight.report import CheckReport
+from pipeline.base.disk import expect_writable
 from pipeline.base.errors import UserError, printable
 from pipeline.base.files import replacing, replacing_folder
 from pipeline.base.layout import Layout

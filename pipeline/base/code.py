@@ -11,11 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 CODE = ("pipeline/", "rig/", "stages/", "app/", "sling2sim2real/", "validation/")
-UNTRACKED = (
-    "pipeline/params/",
-    "stages/start.py",
-    "stages/dvc_files.py",
-)  # nobody's dependency: see tools/closure.py
+UNTRACKED = ("pipeline/params/", "stages/start.py")  # nobody's dependency: see tools/closure.py
 NESTED = (  # folders of folders: what lies in them is a concern by itself, be it folder or file
     "pipeline/",
     "pipeline/identify/",

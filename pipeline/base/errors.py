@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import io
 import os
+import signal
 import sys
 from collections.abc import Callable
 
@@ -55,27 +56,31 @@ def _whose(path: str) -> str:
     return f": {what} is user {owner}'s, you are {us}; have it yours (chown), or copy the project"
 
 
-# What the extra `run` of pyproject.toml brings, as it is imported.
-OF_THE_EXTRA = frozenset(
-    "botorch dvc fastapi gpytorch markdown_it networkx numba onnx onnxscript prefect psutil"
-    " rsl_rl sksundae tensordict torch".split()
-)
+# What extras of pyproject.toml bring, as it is imported.
+EXTRAS = {
+    "run": "botorch dvc fastapi gpytorch markdown_it networkx numba onnx onnxscript prefect psutil"
+    " rsl_rl sksundae tensordict torch",
+    "cluster": "dask dask_jobqueue distributed",
+}
 
 
 def absent(error: ModuleNotFoundError) -> str | None:
     """How to get a package that a light install lacks; None for any other."""
     name = str(error.name).partition(".")[0]
-    if name not in OF_THE_EXTRA:
-        return None
-    how = "make setup, or pip install '.[run]' -c constraints.txt in the project's folder"
-    return f"{name} is not installed: {how}"
+    for extra, names in EXTRAS.items():
+        if name in names.split():
+            how = f"pip install '.[{extra}]' -c constraints.txt in the project's folder"
+            return f"{name} is not installed: make setup, or {how}"
+    return None
 
 
 def run(main: Callable[[], int | None]) -> None:
     """Run a command: a UserError, or what a disk refuses, is one line on stderr, exit status 1.
 
-    What a terminal's encoding has not is written as Python writes it, by an escape.
+    What a terminal's encoding has not is written as Python writes it, by an escape. SIGTERM
+    interrupts as Ctrl-C does.
     """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

@@ -98,7 +98,7 @@ def test_a_command_line_that_makes_no_sense(refused) -> None:
         ("launch --theta t.json --band band1 --draw=-2.30,0", "from 0.05 to 2, got 2.3"),
         ("observe --band band1 --draw=-0.3,-0.2 --landing 221", "looks like centimetres (2.21)"),
         ("plan --band band1 --rate 1e9", "argument --rate: must be in hertz, from 1 to 10000"),
-        ("flow --cluster foo", "must be such as tcp://10.0.0.5:8786, got 'foo'"),
+        ("flow --dask foo", "must be such as tcp://10.0.0.5:8786, got 'foo'"),
         ("bench --law steel", "invalid choice: 'steel'"),
     ):
         assert expected in refused(2, *arguments.split())

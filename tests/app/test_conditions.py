@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from dvc.config import Config
 
-from app.flow.disk import expect_ready
+from pipeline.base.disk import expect_ready
 from pipeline.base.errors import UserError
 from tests.project import DEFAULTS, ROOT, python
 from validation.projects import SLING, environment

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from app import cli, observe
-from app.flow import child
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
+from pipeline.flow.dvc import StageFailed
 from tests.project import DEFAULTS, with_
 
 DRAW, LANDING = (-0.3, -0.17), 2.2
@@ -20,17 +20,18 @@ def put(tmp_path, params, monkeypatch):
     """`observe` of band1 in an empty project, with the stages that DVC was asked for."""
     requested = []
 
-    def dvc(root, arguments, **callbacks):
-        requested.append(arguments)
-        return status.pop() if status else 0, ["error: it broke"]
+    def repro(root, stage, on_line):
+        requested.append(stage)
+        if failures:
+            raise StageFailed(failures.pop())
 
-    monkeypatch.setattr(child, "dvc", dvc)
-    status = []
+    monkeypatch.setattr(observe, "repro", repro)
+    failures = []
 
     def run(draw=DRAW, landing=LANDING, band="band1", method="least_squares", **options) -> dict:
         return observe.observe(params, band, method, draw, landing, root=tmp_path, **options)
 
-    return SimpleNamespace(run=run, requested=requested, status=status, layout=Layout(tmp_path))
+    return SimpleNamespace(run=run, requested=requested, failures=failures, layout=Layout(tmp_path))
 
 
 def test_a_launch_is_written_below_the_others_and_the_policy_runs(put) -> None:
@@ -40,7 +41,7 @@ def test_a_launch_is_written_below_the_others_and_the_policy_runs(put) -> None:
     assert file.read_text() == (
         "draw_y_m,draw_z_m,draw_error_m,landing_y_m\n-0.3,-0.17,,2.2\n-0.32,-0.2,0.0,3.0\n"
     )
-    assert put.requested == [("repro", "policy@band1-least_squares")] * 2
+    assert put.requested == ["policy@band1-least_squares"] * 2
     answer = {"file": str(file), "launches": 1, "before": None, "after": None, "warnings": []}
     assert first == answer | {"measured_m": LANDING}
     assert list(file.parent.iterdir()) == [file]
@@ -52,8 +53,8 @@ def test_no_run_runs_nothing(put) -> None:
 
 
 def test_a_stage_that_fails_says_why_and_the_launch_stays(put) -> None:
-    put.status.append(1)
-    with pytest.raises(child.StageFailed, match="policy@band1-least_squares: it broke"):
+    put.failures.append("it broke")
+    with pytest.raises(StageFailed, match="it broke"):
         put.run()
     assert (put.layout.evidence / "band1.csv").is_file()
 
@@ -105,7 +106,7 @@ def test_undo_takes_the_last_launch_out_and_the_policy_runs(put, params) -> None
     assert (put.layout.evidence / "band1.csv").read_text() == before
     assert (answer["launches"], answer["measured_m"]) == (1, 3.0)
     assert answer["removed"] == {"draw": [-0.32, -0.2], "error": 0.001}
-    assert put.requested == [("repro", "policy@band1-least_squares")]
+    assert put.requested == ["policy@band1-least_squares"]
     lines = observe.shown(answer | {"after": None}).splitlines()
     assert lines[0].endswith("1 launch as evidence")
     assert lines[1:] == ["taken out: the draw to -0.32, -0.2", "measured  3.000 m; nothing has run"]

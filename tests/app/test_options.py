@@ -16,7 +16,6 @@ import pytest
 
 from app import cli
 from app.command_line import COMMANDS
-from app.flow import child
 from app.preflight.add_band import _with_band
 from app.preflight.check import Look
 from pipeline.base.layout import Layout
@@ -80,7 +79,7 @@ ADDED = {
     OBSERVE.removesuffix(" --no-run"): "--no-run",
     EXPORT: "--method de, --out there, --json",
     "remove-band mine": "--yes",
-    "flow": "--workers 2, --gpus 2, --cluster nowhere",
+    "flow": "theta@band1-paper, --workers 2, --gpus 2, --dask nowhere:8786, --slurm none.yaml",
     "ui": "--port 4300",
     "verify": "--device cuda:0",
     "bench": "--device cuda:0, --law rubber, --json",
@@ -163,12 +162,11 @@ def furnish(place: Path) -> None:
 def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
     """What takes long says what it was given."""
 
-    def dvc(root, arguments, **callbacks) -> tuple[int, list]:
-        requested.append(arguments)
-        card = Layout(root).card(arguments[1].partition("@")[2])
+    def repro(root, stage, on_line) -> None:
+        requested.append(stage)
+        card = Layout(root).card(stage.partition("@")[2])
         card.mkdir(parents=True)
         (card / "card.json").write_text(json.dumps(CARD))
-        return 0, []
 
     def look_at(*given) -> Look:
         message = SimpleNamespace(
@@ -181,15 +179,14 @@ def echo(patch: pytest.MonkeyPatch, requested: list) -> None:
         requested.append((*map(str, given), sorted(map(str, more.items()))))
         return "done"
 
-    patch.setattr(child, "dvc", dvc)
-    patch.setattr("app.fit.fit.stages_of", lambda root: {})
+    patch.setattr("app.fit.fit.repro", repro)
     patch.setattr("app.preflight.recordings.checked", lambda *given: [])
     patch.setattr("app.preflight.command.look_at", look_at)
     patch.setattr("app.export.export_of_run", lambda _, *what: (summary(*what), {"what": 1}))
     patch.setattr("app.export.shown", lambda folder, card: "in words")
     patch.setattr("app.reset._committed", lambda path: DEFAULTS.read_text("utf-8"))
-    patch.setattr("app.flow.run.run", summary)
-    patch.setattr("app.flow.server.serve", summary)
+    patch.setattr("pipeline.flow.run.run", summary)
+    patch.setattr("pipeline.flow.server.serve", summary)
     patch.setattr("validation.simulator.verification.verify", lambda _, device: summary(device))
     patch.setattr("validation.simulator.verification.summary", lambda done: (done, 0))
     patch.setattr("validation.environment.environment", lambda *given: {"given": given})

@@ -1,8 +1,9 @@
 """Bands of one's own, and the rig's with dips: a chain of stages each, none of them the run's."""
 
+import networkx
 import pytest
 
-from app.flow.graph import leading_to, stages_of
+from pipeline.flow.dvc import graph_of
 from pipeline.params import load
 from stages.start import stage_of
 from tests.project import BAND
@@ -38,11 +39,11 @@ def test_ten_bands_make_ten_chains_of_the_first_method(project, first: str) -> N
     methods = [first, *(name for name in SEARCHES if name != first)]
     project("git", "checkout", "-q", "--orphan", first)
     project.set(run_of(["band1", "band2", "band3"], methods, ("de",)) | {"run.own": []})
-    before = {name: stage.producers for name, stage in stages_of(project.folder).items()}
+    before = graph_of(project.folder)
     names = [f"{first}_{n}" for n in range(10)]
     add(project, *names)
-    stages = stages_of(project.folder)
-    mine = stages.keys() - before.keys()
+    graph = graph_of(project.folder)
+    mine = {*graph} - {*before}
     alone = ("episode", "clamps", "evidence", "card")
     steps = (*SEARCHES[first], "theta", "policy", "trials")
     assert mine == {
@@ -52,14 +53,14 @@ def test_ten_bands_make_ten_chains_of_the_first_method(project, first: str) -> N
     params = load(project.folder / "params.yaml")
     for name in names:
         card = stage_of(params, "card", name)
-        chain = {stage.name for stage in leading_to(stages, card)}
+        chain = {card, *networkx.ancestors(graph, card)}
         assert card == f"own_card@{name}" and chain == {
             stage for stage in mine if is_of(stage, name)
         }
         for step in steps:
             assert stage_of(params, step, name, first) in chain
         assert stage_of(params, "theta", name, methods[1]) is None
-    changed = {name for name in before if stages[name].producers != before[name]}
+    changed = {name for name in before if {*graph.pred[name]} != {*before.pred[name]}}
     assert changed == {"report"}  # it reads the folders of all bands
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.app.flow.toy import Toy
+from tests.flow.toy import Toy, stage
 from tests.project import ROOT
 
 SYSTEM = "/usr/bin:/bin"
@@ -16,8 +16,7 @@ SYSTEM = "/usr/bin:/bin"
 @pytest.fixture
 def toy(tmp_path: Path) -> Toy:
     """A project whose one stage is run as those of dvc.yaml are."""
-    stage = {"cmd": "sh stages/run.sh one x", "deps": ["word"], "outs": ["one.out"]}
-    toy = Toy(tmp_path / "toy", {"one": stage}, word="one")
+    toy = Toy(tmp_path / "toy", {"one": stage("sh stages/run.sh one x", "one.out")})
     (toy.folder / "stages").mkdir()
     (toy.folder / "stages/run.sh").write_bytes((ROOT / "stages/run.sh").read_bytes())
     script = "import sys, warp\nopen('one.out', 'w').write(sys.argv[1])\n"
@@ -26,8 +25,8 @@ def toy(tmp_path: Path) -> Toy:
 
 
 def repro(toy: Toy, path: str) -> subprocess.CompletedProcess:
-    env = toy.environment | {"PATH": path}
-    env.pop("PYTHONPATH")
+    env = toy.environment(PATH=path)
+    env.pop("PYTHONPATH", None)
     command = [sys.executable, "-m", "dvc", "repro", "--force"]
     options = {"capture_output": True, "text": True, "timeout": 240}
     return subprocess.run(command, cwd=toy.folder, env=env, **options)
@@ -58,4 +57,6 @@ def test_where_no_python_has_the_packages_one_line_says_so(toy: Toy, tmp_path: P
         text=True,
     )
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
-    assert done.stderr.startswith("error: no Python here has this project's packages: make setup")
+    start = "error: no Python here has this project's packages ("
+    assert done.stderr.startswith(start) and "python: not found" in done.stderr
+    assert "): make setup, then" in done.stderr

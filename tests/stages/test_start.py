@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dvc.lock import Lock
 
 from pipeline.base.layout import NotMade
 from pipeline.identify.objective.box import SearchBox
@@ -195,22 +194,14 @@ start.run(main)
     until(lambda: not alive(pid), 30)
 
 
-def test_a_stage_clears_what_a_killed_dvc_has_copied_in_part(tmp_path: Path) -> None:
-    """Not while a DVC copies, which holds its lock then; DVC gives it up while a stage runs."""
-    locks = tmp_path / ".dvc/tmp"
-    half = ".s07oC0gt_BFYHCELvV-BVg.tmp"  # as DVC has named one
-    halves = [tmp_path / top / half for top in (".dvc/cache/files/md5/49", "data/history/band1")]
-    others = [tmp_path / "data/theta/.least_squares.json.123.tmp", tmp_path / "data/half.tmp"]
-    for file in (locks / "lock", tmp_path / ".dvc/config", *halves, *others):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.touch()
-
-    def run_stage() -> list[bool]:
-        code = "from stages.start import run; run(lambda: None)"
-        done = python("-c", code, folder=tmp_path, DVC_STAGE="a")
-        assert (done.returncode, done.stderr) == (0, "")
-        return [path.exists() for path in (*halves, *others)]
-
-    with Lock(str(locks / "lock")):
-        assert run_stage() == [True, True, True, True]
-    assert run_stage() == [False, False, True, True]
+def test_a_stage_ends_with_the_command_that_started_its_dvc(tmp_path: Path) -> None:
+    """By a kill, which leaves DVC: it sees that the stage has failed, and gives its locks back."""
+    script = "import time; from stages.start import run; run(lambda: time.sleep(60))"
+    flow = subprocess.Popen(["sleep", "60"])
+    variables = environment(DVC_STAGE="a", SLING_FLOW=str(flow.pid))
+    stage = subprocess.Popen([sys.executable, "-c", script], cwd=tmp_path, env=variables)
+    time.sleep(2)
+    assert stage.poll() is None
+    flow.kill()
+    flow.wait()
+    assert stage.wait(20) == 130

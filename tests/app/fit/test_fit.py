@@ -9,10 +9,7 @@ import pytest
 
 from app import cli
 from app.fit import fit as module
-from app.fit.countdown import OTHER, SECONDS, Countdown
 from app.fit.screen import shown
-from app.flow import child
-from app.flow.graph import Stage
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.params import load
@@ -47,17 +44,14 @@ def project(tmp_path, monkeypatch):
     monkeypatch.setattr("app.preflight.recordings.checked", lambda *given: [])
     requested, layout = [], Layout(tmp_path)
 
-    def dvc(root, arguments, **callbacks):
-        requested.append(arguments)
-        band = arguments[1].partition("@")[2]
+    def repro(root, stage, on_line):
+        requested.append(stage)
+        band = stage.partition("@")[2]
         layout.card(band).mkdir(parents=True, exist_ok=True)
         (layout.card(band) / "card.json").write_text(json.dumps(CARD | {"band": band}))
-        callbacks["on_stage"](f"theta@{band}-least_squares")
-        callbacks["on_line"](f"{band}: settled")
-        return 0, []
+        on_line(f"{band}: settled")
 
-    monkeypatch.setattr(child, "dvc", dvc)
-    monkeypatch.setattr(module, "stages_of", lambda root: {})  # no DVC here
+    monkeypatch.setattr(module, "repro", repro)
 
     def recording(name: str, content: str):
         (tmp_path / name).write_text(content)
@@ -75,7 +69,7 @@ def test_a_new_band_is_added_and_its_card_made(project) -> None:
     assert card["band"] == "my_band_2" and card["card"].endswith("bands/my_band_2/README.md")
     band_params = load().bands["my_band_2"]
     assert (band_params.mass, band_params.rest_length, band_params.diameter) == (0.04, 0.5, 0.01)
-    assert project.requested == [("repro", "own_card@my_band_2")]
+    assert project.requested == ["own_card@my_band_2"]
     again = project.run(file, mass=0.04, rest_length=0.5)
     assert again == card and load().run.own[-1] == "my_band_2"
     assert project.run(name="my_band_2") == card
@@ -162,7 +156,7 @@ def test_sizes_of_a_known_band_take_the_place_of_the_old_ones(project, capsys) -
     assert "bands.a.diameter was 0.01, is 0.011 now" in output and "rest_length was 0.52" in output
     band = load().bands["a"]
     assert (band.mass, band.diameter, band.rest_length) == (0.04, 0.011, 0.5)
-    assert project.requested == [("repro", "own_card@a")] * 3
+    assert project.requested == ["own_card@a"] * 3
 
 
 def test_sizes_that_cannot_be_or_what_fails_with_them_change_nothing(project, capsys) -> None:
@@ -188,7 +182,7 @@ def test_a_recorded_band_among_those_of_all_methods_is_reported(project, capsys)
     text = path.read_text().replace("  own:", "  own: []", 1).replace("  - a\n", "", 1)
     path.write_text(text.replace("  - band3\n", "  - band3\n  - a\n", 1))
     project.run(name="a")
-    assert project.requested[-1] == ("repro", "card@a")
+    assert project.requested[-1] == "card@a"
     assert "under run.own instead it gets its card alone" in capsys.readouterr().err
 
 
@@ -205,28 +199,6 @@ def test_the_screen() -> None:
     assert lines[-2] == "Card: reports/bands/mine/README.md" and len(lines) < 25
     page = re.fullmatch(r"Page: file://(/.*/reports/bands/mine/index\.html)", lines[-1])
     assert page
-
-
-def test_the_countdown_tells_each_stage_and_falls(capsys, monkeypatch) -> None:
-    clock = [0.0]
-    monkeypatch.setattr("app.fit.countdown.time.monotonic", lambda: clock[0])
-    chain = ["episode", "history", "density", "theta", "policy", "trials", "card"]
-    worth = {step: SECONDS.get(step, OTHER) for step in chain}
-    stages = [Stage(f"{step}@mine", step, "mine", (), False, (), True, step) for step in chain]
-    countdown = Countdown(stages)
-    for step in chain:
-        countdown.begins(f"{step}@mine")
-        clock[0] += 2 * worth[step]  # a machine half as fast
-    countdown.line("history-mine-x 48/600 rollouts")
-    countdown.line("mine: 300 samples")
-    countdown.ends()
-    lines = capsys.readouterr().err.splitlines()
-    left = [line.rpartition("about ")[2].split()[0] for line in lines[: len(chain)]]
-    seconds = [60 * int(text.split(":")[0]) + int(text.split(":")[1]) for text in left]
-    assert lines[0].startswith(f"[1/{len(chain)}] episode; about")
-    assert seconds == sorted(seconds, reverse=True) and seconds[0] == sum(worth.values())
-    assert seconds[-1] == 2 * worth["card"]  # by then the machine's pace is known
-    assert lines[-2:] == ["      mine: 300 samples", f"done in {clock[0]:.0f} s"]
 
 
 def test_the_command(project, monkeypatch, capsys) -> None:

@@ -13,7 +13,6 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from app.fit import fit
-from app.flow import child
 from app.preflight.command import check
 from app.preflight.recordings import add_recording
 from pipeline.base.errors import UserError
@@ -98,8 +97,7 @@ def test_fit_brings_better_masks_of_a_recording_that_is_there(
         card.mkdir(parents=True, exist_ok=True)
         (card / "card.json").write_text("{}")
 
-    monkeypatch.setattr(child, "repro", repro)
-    monkeypatch.setattr(fit, "stages_of", lambda root: {})  # DVC is not there
+    monkeypatch.setattr(fit, "repro", repro)
 
     def run(recording: Path) -> dict[str, bytes]:
         fit.fit([recording], "red", fit.NewBand(mass=0.0408), root=by_folder)

@@ -8,6 +8,8 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 from pipeline.base.errors import UserError, refused
@@ -56,18 +58,8 @@ def expect_ready(root: Path) -> None:
     written = [path for pattern in WRITTEN for path in sorted(root.glob(pattern))]
     expect_writable(root, root / ".dvc" / "tmp", *written)
     expect_room(root)
-    _without_git(root)
-
-
-def _without_git(root: Path) -> None:
-    """Tell DVC, for this copy alone, where a project has no Git: it was unpacked from a ZIP."""
-    from dvc.config import Config, merge
-
     folders = (root.resolve(), *root.resolve().parents)
-    dvc = root / ".dvc"
-    if any((folder / ".git").exists() for folder in folders) or not dvc.is_dir():
-        return
-    config = Config(str(dvc))
-    if not config["core"].get("no_scm"):
-        with config.edit("local") as local:
-            merge(local, {"core": {"no_scm": True}})
+    with_git = any((folder / ".git").exists() for folder in folders)
+    if (root / ".dvc").is_dir() and not with_git:  # it was unpacked from a ZIP
+        without_git = ("config", "--local", "core.no_scm", "true")
+        subprocess.run([sys.executable, "-P", "-m", "dvc", *without_git], cwd=root, check=True)

@@ -35,6 +35,7 @@ EXTRAS = {
     "app/preflight/timeline.py": "rerun",
     "examples/sam3_masks.py": "sam3",
     "tests/examples/test_sam3_masks.py": "sam3",
+    "tests/examples/tiny_sam3.py": "sam3",
     "tests/": "dev",
     "tests/recording/input/test_kinematics.py": "validation",  # skipped where that is missing
     "tests/recording/masks/": "validation",

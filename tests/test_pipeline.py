@@ -125,7 +125,7 @@ def test_a_run_leaves_only_its_lock_and_report_for_git(project: Copy) -> None:
     assert all(name == "dvc.lock" or name.startswith("reports/") for name in changed)
 
 
-OF_OTHER_RECORDINGS = {"setup.urdf", "setup.start_pose"}
+OF_OTHER_RECORDINGS = {"setup.urdf"}
 
 
 def covers(listed: str, read: str) -> bool:

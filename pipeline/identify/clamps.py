@@ -83,8 +83,7 @@ class ClampCalibration:
     Attributes:
         clamp_direction, flexural_rigidity: As of a `Mounting`.
         clamp_angle_deg: From the setup's clamp direction.
-        relative_rigidity: To a solid round band of `nominal_youngs_modulus` [Pa].
-        slack_until: On the episode's clock [s].
+        relative_rigidity: To a solid round band that holds the recorded force.
         loss: As `setup` says (`solid_and_vertical`; None where that fails), and `fitted`.
     """
 
@@ -92,8 +91,6 @@ class ClampCalibration:
     flexural_rigidity: float
     clamp_angle_deg: float
     relative_rigidity: float
-    nominal_youngs_modulus: float
-    slack_until: float
     loss: dict[str, float | None]
 
 
@@ -156,7 +153,5 @@ def calibrate_clamps(
         flexural_rigidity=solid * rigidity,
         clamp_angle_deg=angle,
         relative_rigidity=rigidity,
-        nominal_youngs_modulus=young,
-        slack_until=float(part.time[-1]),
         loss={"solid_and_vertical": start if np.isfinite(start) else None, "fitted": value},
     )

@@ -19,7 +19,7 @@ from torch import nn
 from pipeline.base.files import replacing, write_json
 from pipeline.params import Params
 from pipeline.params.provenance import policy_settings_of
-from pipeline.policy.train import Policy, ProjectilePolicy, Trained
+from pipeline.policy.train import Policy, Trained
 from pipeline.simulator.rubber import NEO_HOOKEAN
 
 OPSET, IR_VERSION = 18, 10  # any onnxruntime from 1.18 (2024) on reads these
@@ -67,7 +67,7 @@ def write_onnx(policy: Policy, path: Path) -> None:
     value = node("Sub", INPUT, tensor("target_center", policy.target_center))
     value = node("Div", value, tensor("target_half", policy.target_half))
     ports, seen = {INPUT: 1}, "target displacement along y [m]"
-    if isinstance(policy, ProjectilePolicy):
+    if policy.projectile is not None:
         ports, seen = {PROJECTILE: 2, **ports}, f"projectile position (y, z) [m] and {seen}"
         position = node("Sub", PROJECTILE, tensor("draw_center", policy.draw_center))
         position = node("Div", position, tensor("draw_half", policy.draw_half))
@@ -174,7 +174,7 @@ def card(
 
 def _projectile(policy: Policy) -> dict:
     """Part of the card on the input of a policy that sees the projectile; empty for any other."""
-    if not isinstance(policy, ProjectilePolicy):
+    if policy.projectile is None:
         return {}
     content = {
         "name": PROJECTILE,

@@ -32,15 +32,25 @@ CHECKED_TARGETS = 256
 
 
 class Policy(nn.Module):
-    """Target in metres to draw in metres; the normalisation of both is part of it."""
+    """Target in metres to draw in metres; the normalisation of both is part of it.
+
+    Attributes:
+        projectile: Where it starts (y, z) [m], of a policy whose state is the paper's: the
+            projectile's position, then the target. None: the target alone.
+    """
 
     target_center: torch.Tensor
     target_half: torch.Tensor
     draw_center: torch.Tensor
     draw_half: torch.Tensor
+    projectile: torch.Tensor | None
 
     def __init__(
-        self, network: nn.Sequential, targets: tuple[float, float], surface: Source
+        self,
+        network: nn.Sequential,
+        targets: tuple[float, float],
+        surface: Source,
+        projectile: tuple[float, float] | None = None,
     ) -> None:
         super().__init__()
         low, high = targets
@@ -50,48 +60,22 @@ class Policy(nn.Module):
         self.register_buffer("target_half", torch.tensor([(high - low) / 2]))
         self.register_buffer("draw_center", center)
         self.register_buffer("draw_half", half)
+        start = None if projectile is None else torch.tensor(projectile)
+        self.register_buffer("projectile", start)
 
-    def forward(self, target: torch.Tensor) -> torch.Tensor:
-        """Draws (y, z) [m], shape (N, 2), for targets [m], shape (N, 1)."""
-        action = self.network((target - self.target_center) / self.target_half)
-        return self.draw_center + self.draw_half * torch.tanh(action)
-
-    def draws(self, targets: np.ndarray) -> np.ndarray:
-        """The same for arrays, shapes (N,) and (N, 2)."""
-        with torch.inference_mode():
-            return self(torch.as_tensor(targets, dtype=torch.float32)[:, None]).double().numpy()
-
-
-class ProjectilePolicy(Policy):
-    """The same for a state as the paper prints it: where the projectile is, and the target."""
-
-    projectile: torch.Tensor
-
-    def __init__(
-        self,
-        network: nn.Sequential,
-        targets: tuple[float, float],
-        surface: Source,
-        projectile: tuple[float, float],
-    ) -> None:
-        """Set `projectile`, where it starts (y, z) [m]."""
-        super().__init__(network, targets, surface)
-        self.register_buffer("projectile", torch.tensor(projectile))
-
-    def forward(  # pyright: ignore[reportIncompatibleMethodOverride]
-        self, projectile: torch.Tensor, target: torch.Tensor
-    ) -> torch.Tensor:
-        """Draws (y, z) [m], shape (N, 2), for positions [m], (N, 2), and targets [m], (N, 1)."""
-        position = (projectile - self.draw_center) / self.draw_half
-        goal = (target - self.target_center) / self.target_half
-        action = self.network(torch.cat([position, goal], 1))
-        return self.draw_center + self.draw_half * torch.tanh(action)
+    def forward(self, target: torch.Tensor, projectile: torch.Tensor | None = None) -> torch.Tensor:
+        """Draws (y, z) [m], shape (N, 2), for targets [m], (N, 1), and positions [m], (N, 2)."""
+        seen = [(target - self.target_center) / self.target_half]
+        if projectile is not None:
+            seen.insert(0, (projectile - self.draw_center) / self.draw_half)
+        return self.draw_center + self.draw_half * torch.tanh(self.network(torch.cat(seen, 1)))
 
     def draws(self, targets: np.ndarray) -> np.ndarray:
-        """Draws for targets (N,) [m] and the projectile where it starts, shape (N, 2)."""
+        """Draws (N, 2) [m] for targets (N,) [m], the projectile where it starts."""
         goals = torch.as_tensor(targets, dtype=torch.float32)[:, None]
+        start = None if self.projectile is None else self.projectile.expand(len(goals), 2)
         with torch.inference_mode():
-            return self(self.projectile.expand(len(goals), 2), goals).double().numpy()
+            return self(goals, start).double().numpy()
 
 
 @dataclass(frozen=True)
@@ -150,8 +134,7 @@ def train(
             configured = settings(params, env.groups)
             ppo = PPO.construct_algorithm(env.get_observations(), env, configured, "cpu")
         network: Any = ppo.get_policy()
-        sizes = network.mlp, params.targets, surface
-        policy = Policy(*sizes) if projectile is None else ProjectilePolicy(*sizes, projectile)
+        policy = Policy(network.mlp, params.targets, surface, projectile)
         checked = np.linspace(*params.targets, CHECKED_TARGETS)
         rows: list[dict] = []
         reasons: Counter[str] = Counter()

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.base.errors import UserError
-from pipeline.base.schema import Section
 from pipeline.episode.episode import Episode
 from pipeline.params import Params, expect_known
 from pipeline.params.lab import BandParams
@@ -101,12 +100,7 @@ def episode_of(done: Checked, band_name: str, params: Params) -> Episode:
     def of_streams(name: str) -> dict[str, Any]:
         return {role: getattr(stream, name) for role, stream in recording.streams.items()}
 
-    removal = "statistical_neighbors", "statistical_ratio", "radius", "radius_neighbors", "sampling"
     metadata = {
-        "setup": {
-            **_named(params.setup, "fork_width", "fork_height"),
-            "band": _named(params.bands[band_name], "mass", "diameter", "rest_length"),
-        },
         "input": {
             "file": recording.path.name,
             "pull": done.pull.number,
@@ -123,16 +117,7 @@ def episode_of(done: Checked, band_name: str, params: Params) -> Episode:
         },
         "cautions": [caution.content() for caution in done.cautions],
         "geometry": EpisodeGeometry.of(recording, geometry).content(),
-        "preprocessing": {
-            **asdict(signals.facts),
-            "delays": asdict(done.delays),
-            **_named(params.force, "cutoff", "cutoff_unit"),
-            **_named(params.cloud, "mask", "points", *removal),
-            "mask_colors": clouds.color_counts,
-            "empty_clouds": clouds.empty,
-            "damaged_frames": clouds.damaged,
-            "unpaired_frames": clouds.unpaired,
-        },
+        "preprocessing": {**asdict(signals.facts), "delays": asdict(done.delays)},
     }
     return Episode(
         band=band_name,
@@ -148,7 +133,3 @@ def episode_of(done: Checked, band_name: str, params: Params) -> Episode:
         camera=geometry.camera.translation,
         metadata=metadata,
     )
-
-
-def _named(section: Section, *names: str) -> dict[str, Any]:
-    return {name: getattr(section, name) for name in names}

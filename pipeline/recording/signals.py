@@ -15,7 +15,7 @@ from pipeline.params.lab import Tool
 from pipeline.params.recording import EpisodeParams
 from pipeline.recording.geometry import turned
 from pipeline.recording.grasp import MARGIN
-from pipeline.recording.motion import VELOCITY_WINDOW, Motion, expect_dense, interpolated
+from pipeline.recording.motion import Motion, expect_dense, interpolated
 from pipeline.recording.pulls import Pull
 from pipeline.recording.tare import band_force
 from pipeline.recording.tool_inertia import ToolInertia
@@ -51,14 +51,11 @@ class SignalFacts:
         flipped: The sensor reports the force of the gripper on the band.
         turn: Largest turn of the hand before the release [rad].
         tool: None where nothing was taken off.
-        rate: Of the force [Hz].
         longest_gap: In the window, by topic [s].
-        cutoff_hz: Of the force's filter [Hz].
         release_error, release_fall, release_resolution, release_spread: Of `Release` [s].
         filtered: A filter is between sensor and recording, by how the force falls.
         slips: Sudden drops of the held force before the release, since the window's start [s].
         jumps: Those of the free hand before the grasp, that are not in `zeroed` [s].
-        velocity_window: Of the fits that differentiate the path [s].
     """
 
     bias: list[float]
@@ -73,9 +70,7 @@ class SignalFacts:
     flipped: bool
     turn: float
     tool: ToolFacts | None
-    rate: float
     longest_gap: dict[str, float]
-    cutoff_hz: float
     release_error: float
     release_fall: float
     release_resolution: float
@@ -83,7 +78,6 @@ class SignalFacts:
     filtered: bool
     slips: list[float]
     jumps: list[float]
-    velocity_window: float
 
 
 @dataclass(frozen=True)
@@ -176,9 +170,7 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
         flipped=band.flipped,
         turn=turn,
         tool=_tool_facts(tool, "setup.tool") or _tool_facts(inertia, "its inertia"),
-        rate=rate,
         longest_gap=gaps,
-        cutoff_hz=cutoff,
         release_error=release.error,
         release_fall=release.fall,
         release_resolution=release.resolution,
@@ -190,7 +182,6 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
             if time >= grasp - MARGIN and not _lets_back(motion, time)
         ],
         jumps=[time - start for time in release.slips if time < grasp - MARGIN],
-        velocity_window=VELOCITY_WINDOW,
     )
     return Signals(
         origin=recording.origin + round(start * 1e9),

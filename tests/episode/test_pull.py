@@ -1,7 +1,10 @@
 """How long a hand drew and waited, by knots that are known."""
 
+from dataclasses import replace
+
 import pytest
 
+from pipeline.base.errors import UserError
 from pipeline.episode.pull import EDGES, PARTS, launch_history
 from tests.episode import led
 
@@ -42,6 +45,12 @@ def test_dips_and_cycles(knots, pull_time, pause) -> None:
     assert history["pull_time"] == pytest.approx(pull_time, rel=0.1)
     assert history["pause"] == pytest.approx(pause, abs=0.1)
     assert history["deepest"] == pytest.approx(0.4, abs=2e-3)
+
+
+def test_a_hand_that_lets_go_at_the_fork_is_refused() -> None:
+    episode = led.episode(led.MONOTONE)
+    with pytest.raises(UserError, match="the hand lets go at the fork"):
+        launch_history(replace(episode, position=0 * episode.position))
 
 
 def test_the_deepest_draw_is_of_any_time() -> None:

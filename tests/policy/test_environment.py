@@ -57,26 +57,6 @@ def test_targets_cover_the_range_and_change_every_step(env) -> None:
         assert abs(observed.mean()) < 0.1
 
 
-def test_equal_seeds_give_equal_targets(toy_map, env) -> None:
-    twin, other = (make(toy_map.surface, seed=seed) for seed in (7, 8))
-    assert (twin.get_observations()["target"] == env.get_observations()["target"]).all()
-    assert (other.get_observations()["target"] != env.get_observations()["target"]).any()
-
-
-def test_each_part_of_the_reward_counts(toy_map) -> None:
-    actions = torch.randn(400, 2, generator=torch.Generator().manual_seed(0))
-
-    def reward(**changes) -> np.ndarray:
-        other = SimpleNamespace(**{**vars(REWARD), **changes})
-        return make(toy_map.surface, reward=other).step(actions)[1].numpy()
-
-    usual = reward()
-    failed = usual == -1
-    np.testing.assert_allclose(reward(height=10.0)[~failed], 2 * usual[~failed], rtol=1e-6)
-    np.testing.assert_allclose(reward(scale=1.0)[~failed], np.sqrt(5 * usual[~failed]), rtol=1e-5)
-    np.testing.assert_array_equal(reward(penalty=3.0)[failed], -3.0)
-
-
 def test_the_projectile_is_seen_where_it_starts(toy_map, env) -> None:
     """In half boxes of draws, beside the same targets; the same in every step."""
     seeing = make(toy_map.surface, projectile=(-0.25, -0.30))

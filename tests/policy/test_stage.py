@@ -68,6 +68,7 @@ USUAL = {"landings": "map", "exploration": "scheduled", "state": "target"}
 PRINTED = {"landings": "simulated", "exploration": "learned", "state": "projectile_target"}
 
 
+@pytest.mark.slow
 def test_as_the_paper_prints_it(project) -> None:
     """Each switch alone gives another policy; all at once, one with an honest card."""
     project()

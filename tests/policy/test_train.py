@@ -73,6 +73,7 @@ def error_of(trained: Trained) -> float:
     return float(np.abs(truth.landing_y - targets).mean())
 
 
+@pytest.mark.slow
 def test_on_simulated_launches_it_hits_without_a_map(toy_map, settings) -> None:
     """Each transition is one launch, and each deterministic check one for every target."""
     launched = []
@@ -89,16 +90,7 @@ def test_on_simulated_launches_it_hits_without_a_map(toy_map, settings) -> None:
     assert trained.failures.keys() == {TOO_MUCH_FORCE}
 
 
-def test_simulated_launches_give_the_same_training_again_and_another_than_the_map(
-    toy_map, settings
-) -> None:
-    def simulated() -> Trained:
-        return train(SimulatedLandings(toy.launch, toy_map.surface), short(settings))
-
-    once, by_map = simulated(), train(toy_map.surface, short(settings))
-    assert same(once, simulated()) and not same(once, by_map)
-
-
+@pytest.mark.slow
 def test_a_learned_exploration_narrows_by_itself(toy_map, settings) -> None:
     learned = SimpleNamespace(**{**vars(settings), "exploration": "learned"})
     trained = train(toy_map.surface, learned)

@@ -50,7 +50,10 @@ def led(name: str) -> Led:
     return Led(knots=KNOTS[name], drawn=KNOTS[name][-2][0], release=release, end=release + 1.2)
 
 
-@pytest.fixture(scope="session", params=KNOTS)
+LONG = pytest.param("cycles", marks=pytest.mark.slow)
+
+
+@pytest.fixture(scope="session", params=["dip", "fast", LONG])
 def done(request, params, tmp_path_factory):
     """(name, truth, the one pull that is in it); to be read only."""
     path, truth = written(tmp_path_factory, f"{request.param}.mcap", truth=led(request.param))

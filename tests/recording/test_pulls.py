@@ -17,7 +17,7 @@ from pipeline.recording.motion import Motion
 from pipeline.recording.pulls import Pull, pulls_of
 from tests.project import with_
 from tests.recording.conftest import written
-from tests.recording.joined import joined
+from tests.recording.parts import joined
 from validation.recordings.bag import START, Truth, blind_bag, edit
 
 DEEP, SHALLOW = Truth(), Truth(draw=0.26, release=3.1507)

@@ -19,12 +19,6 @@ def test_mesh_fills_the_round_band_and_neighbours_share_faces():
         assert Counter(faces.values()) == {1: outside, 2: (4 * len(tets) - outside) // 2}
 
 
-def test_the_papers_mesh_has_900_tetrahedra_in_sections_of_seven():
-    vertices, tetrahedra = cylinder(np.linspace(0, 0.55, 51), 0.010)
-    assert vertices.shape == (51, 7, 3) and tetrahedra.shape == (900, 4)
-    assert np.ptp(tetrahedra // 7, axis=1).max() == 1  # each lies between two sections
-
-
 def test_section_bends_like_a_circle():
     points, triangles = section(0.005)
     corners = points[triangles]

@@ -63,12 +63,6 @@ def test_drag_differs_by_rollout_and_slows_the_recoil(strong_grip, episode):
     assert moved[0] > 1.05 * moved[1] > 1.05**2 * moved[2]
 
 
-def test_drag_shortens_a_launch(sling, launch_setup):
-    blown = neo(THETA, air_drag=np.array([0.0, 3.0]))
-    still, slowed = launch(sling, launch_setup, blown, [-0.33, -0.17]).landing_y
-    assert 0.93 < slowed / still < 0.995
-
-
 def test_air_brakes_a_band_as_a_cylinder_across_the_wind_and_not_along_it(sling):
     """Speed v_t tanh(g t / v_t), v_t² = 2 m g / (rho C d L); end first it falls free."""
     light = replace(sling, clamped=(False, False), mass=2e-3, air_density=1.2)

@@ -1,7 +1,6 @@
 """The sling of a band: with the clamps that its recording showed, or without."""
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -10,7 +9,7 @@ from pipeline.base.layout import Layout
 from pipeline.identify.results.mounting import load_sling, sling_of_method
 from pipeline.identify.results.theta import calibrated, launch_setup, load_theta
 from pipeline.params import load
-from pipeline.simulator import ClampedBand, interact, launch
+from pipeline.simulator import launch
 from pipeline.simulator.parameters import THETA, Parameters
 from tests.project import DEFAULTS
 
@@ -54,16 +53,3 @@ def test_a_theta_file_says_so_and_its_launches_land_elsewhere(root: Path) -> Non
         )
     assert landings[0] == landings[1]
     assert 1e-3 < abs(landings[2] - landings[0]) < 0.5
-
-
-def test_a_recorded_pull_reads_no_launch_setting(episode) -> None:
-    launching = {"projectile_mass", "arm_stiffness", "fork_height", "foot_height"}
-    launching |= {"launch_step", "launch_time"}
-    setup, resolution = (
-        SimpleNamespace(**{name: value for name, value in section if name not in launching})
-        for section in (PARAMS.setup, PARAMS.sling)
-    )
-    band = ClampedBand.of(PARAMS.bands["band1"], setup, resolution)
-    assert interact(band, episode, Parameters.of("neo_hookean", [*VALUES.values()])).failure == [
-        None
-    ]

@@ -26,6 +26,7 @@ from validation.simulator.finding import Bench
 DEPTH = 0.40  # m, of the draw
 STEP, TIMES = 2.5e-4, np.arange(0.004, 0.0441, 0.004)  # s, after the release
 SHARE, YOUNG = 0.5, 2.5e5  # Mooney's, Pa
+pytestmark = pytest.mark.slow  # the string is compiled
 LIMIT = 10.0  # mm, 2 % of the way that the middle goes
 
 

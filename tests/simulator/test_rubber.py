@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.base.errors import UserError
-from pipeline.episode.pull import launch_history
 from pipeline.simulator import interact, launch
 from pipeline.simulator.launch import memory_of_pull
 from pipeline.simulator.model import LaunchHistory
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import RUBBER, TIMES, flowed, overstress, update
-from rig.physics.motion import pull_history
 from tests.simulator.bands import neo
 
 THETA = np.array([3e5, 0.45, 2e-3, 0.5, 0.7])
@@ -117,16 +113,9 @@ def test_every_theta_may_have_its_own_parameters(rubber, launch_setup):
         "flow": np.array([0.2, 0.0, 0.1]),
         "log_flow_rate": np.array([2.0, 0.0, 3.0]),
     }
-    history = LaunchHistory(2.0, 1.0)
-    many = gum(**parameters)
-    launch_setup = replace(launch_setup, history=history)
-    together = launch(rubber, launch_setup, many, DRAW).landing_y
-    alone = [
-        launch(
-            rubber, launch_setup, gum(**{name: parameters[name][k] for name in parameters}), DRAW
-        ).landing_y[0]
-        for k in range(3)
-    ]
+    many, setup = gum(**parameters), replace(launch_setup, history=LaunchHistory(2.0, 1.0))
+    together = launch(rubber, setup, many, DRAW).landing_y
+    alone = [launch(rubber, setup, many[k : k + 1], DRAW).landing_y[0] for k in range(3)]
     np.testing.assert_array_equal(together, alone)
 
 
@@ -190,33 +179,3 @@ def test_updates_are_exact_for_straight_histories():
     forget, follow = update(np.array([1e-6, 1e3]))
     np.testing.assert_allclose(follow[0], 1, rtol=1e-3)
     assert forget[1, :3].max() < 1e-40
-
-
-def test_history_of_a_recording():
-    """A cubic pull of 4 s and a pause of 2 s, with an approach before and a retreat after."""
-    time = np.arange(0, 10, 0.03)
-    way = np.interp(time - 2, np.arange(0, 6.001, 0.01), pull_history(0.01))
-    position = np.outer(way, [0.0, -0.4, -0.1])
-    position[time < 1.5] = [0.0, -0.1, -0.3]
-    position[time > 8] = [0.0, -0.5, -0.1]
-    episode = SimpleNamespace(time=time, position=position, grasp_time=1.0, release_time=8.0)
-    episode.band = "test"
-    history = launch_history(episode)
-    assert history["pull_time"] == pytest.approx(4.0, abs=0.1)
-    assert history["pause"] == pytest.approx(2.0, abs=0.1)
-    assert history["deepest"] == pytest.approx(np.hypot(0.4, 0.1), abs=1e-6)
-    assert launch_history(SimpleNamespace(**vars(episode) | {"release_time": 1e6}))["pause"] <= 1e5
-    for release in (-1.0, 8.0):
-        still = vars(episode) | {"release_time": release, "position": 0 * position}
-        with pytest.raises(UserError, match="the hand lets go at the fork"):
-            launch_history(SimpleNamespace(**still))
-
-
-def test_a_pause_fades_the_memory_by_its_own_length(rubber):
-    """Whatever the pull's: exp(-pause / t) of what it left."""
-    for pull_time in (0.05, 4.0, 100.0):
-        none, some = (
-            unrelaxed(rubber, LaunchHistory(pull_time, pause), DRAW[None])[0]
-            for pause in (0.0, 0.7)
-        )
-        np.testing.assert_allclose(some, none * np.exp(-0.7 / TIMES), rtol=1e-12)

@@ -23,12 +23,6 @@ def refusal(file: Path, text: str) -> str:
     return str(error.value)
 
 
-def test_a_theta_file_comes_back(tmp_path: Path) -> None:
-    file = tmp_path / "theta.json"
-    file.write_text(json.dumps({"band": "red", "theta": SOFT}))
-    assert parameters_of(load_theta(file, "red")).theta.tolist() == [list(SOFT.values())]
-
-
 def test_values_out_of_range_are_named(tmp_path: Path) -> None:
     wrong = {
         "youngs_modulus": [0, 10**400],
@@ -48,13 +42,11 @@ def test_what_is_no_json_object(tmp_path: Path) -> None:
         assert "cannot be read as JSON" in refusal(tmp_path / "theta.json", text)
 
 
-def test_the_drag_comes_back(tmp_path: Path) -> None:
+def test_a_theta_file_comes_back_with_its_drag(tmp_path: Path) -> None:
     file = tmp_path / "theta.json"
-    output = {"air_drag": 2.5}
-    file.write_text(json.dumps({"band": "red", "theta": SOFT, "nuisances": output}))
-    assert load_theta(file, "red")["nuisances"] == output
+    file.write_text(json.dumps({"band": "red", "theta": SOFT, "nuisances": {"air_drag": 2.5}}))
     parameters = parameters_of(load_theta(file, "red"))
-    assert parameters.column("air_drag").tolist() == [2.5]
+    assert parameters.sample() == {**SOFT, "air_drag": 2.5, "turn_damping": 0, "returned_share": 1}
     assert parameters_of({"theta": SOFT}).column("air_drag").tolist() == [0.0]
     assert parameters_of(content_of(parameters)).values.tolist() == parameters.values.tolist()
 
@@ -91,12 +83,8 @@ def test_bad_nuisances_are_one_line(tmp_path: Path) -> None:
     for output, message in (
         ({"drag": 1.0}, "nuisances.drag: unknown key, the closest known one is air_drag"),
         ([1.0], "nuisances: must be a mapping"),
-        (None, "nuisances: must be a mapping"),
         ({"air_drag": -1}, "nuisances.air_drag: must be between 0 and 50, got -1"),
-        ({"air_drag": float("nan")}, "nuisances.air_drag: must be between"),
-        ({"air_drag": float("inf")}, "nuisances.air_drag: must be between"),
         ({"air_drag": True}, "nuisances.air_drag: must be a number between 0 and 50"),
-        ({"camera_delay": 0.001}, "nuisances.camera_delay: unknown key"),
     ):
         text = json.dumps({"band": "red", "theta": SOFT, "nuisances": output})
         assert message in refusal(tmp_path / "theta.json", text)
@@ -121,7 +109,3 @@ def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:
     path.write_text(json.dumps(content | {"names": with_drag["names"]}))
     with pytest.raises(UserError, match="samples: must have a column for each"):
         load_samples(path, best)
-    for damaged in ("{", "[]", json.dumps(content | {"names": ["a"]}), '{"names": []}'):
-        path.write_text(damaged)
-        with pytest.raises(UserError, match="none.json: "):
-            load_samples(path, best)

@@ -12,8 +12,7 @@ from pipeline.identify.objective.session import load_episodes
 from stages import episode
 from tests.project import with_
 from tests.recording.conftest import blind, params, seen
-from tests.recording.joined import joined
-from tests.recording.split import split
+from tests.recording.parts import joined, split
 
 __all__ = ["blind", "params", "seen"]
 

@@ -7,7 +7,7 @@ pipeline reads it with rosbags.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -16,6 +16,9 @@ from typing import BinaryIO
 
 import cv2
 import numpy as np
+from mcap.reader import make_reader
+from mcap.records import Channel, Schema
+from mcap.records import Message as Recorded
 from mcap.writer import Writer
 from mcap_ros2._dynamic import serialize_dynamic
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -227,6 +230,30 @@ def write_bag(
                 write("depth", "/camera/depth/compressedDepth", t, 0.016, body, "optical")
         writer.finish()
     return truth
+
+
+def messages_of(path: Path) -> list[tuple[Schema, Channel, Recorded]]:
+    """All messages of a file, as mcap's own reader has them."""
+    with path.open("rb") as file:
+        return list(make_reader(file).iter_messages())
+
+
+def write_again(
+    messages: Iterable[tuple[Schema, Channel, Recorded]], path: Path, **options: object
+) -> None:
+    """Write messages of `messages_of` to a file of their own; `options` are the MCAP writer's."""
+    numbers: dict[str, int] = {}
+    with path.open("wb") as file:
+        writer = Writer(file, **options)
+        writer.start("ros2")
+        for schema, channel, message in messages:
+            topic, encoding = channel.topic, channel.message_encoding
+            if topic not in numbers:
+                kind = writer.register_schema(schema.name, schema.encoding, schema.data)
+                numbers[topic] = writer.register_channel(topic, encoding, kind)
+            times = message.log_time, message.data, message.publish_time
+            writer.add_message(numbers[topic], *times)
+        writer.finish()
 
 
 def edit(**edits: Callable[[int, object], object]) -> Callable[[str, int, object], object]:

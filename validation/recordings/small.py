@@ -15,12 +15,19 @@ from types import SimpleNamespace as Message
 import cv2
 import numpy as np
 from mcap.reader import make_reader
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 from mcap_ros2.decoder import DecoderFactory
 
 from pipeline.params import Params, load
 from validation.projects import DEFAULTS
-from validation.recordings.bag import Lens, RosWriter, Truth, write_bag
+from validation.recordings.bag import (
+    Lens,
+    RosWriter,
+    Truth,
+    messages_of,
+    write_again,
+    write_bag,
+)
 from validation.recordings.foxglove_bag import translate
 
 CONTAINERS = {
@@ -47,7 +54,7 @@ def write_small(path: Path, family: str, container: str) -> None:
         bag, other = Path(folder) / "bag.mcap", Path(folder) / "other.mcap"
         write_bag(bag, TRUTH, rate=200, pose_rate=200 if family == "franka" else 50, lens=LENS)
         FAMILIES[family](bag, other)
-        _contained(other, path, {"chunk_size": 12_000, **CONTAINERS[container]})
+        write_again(messages_of(other), path, **{"chunk_size": 12_000, **CONTAINERS[container]})
 
 
 def small_params() -> Params:
@@ -62,24 +69,6 @@ def small_params() -> Params:
         "bands": {"band1": band},
     }
     return whole.model_copy(update=sections)
-
-
-def _contained(source: Path, target: Path, options: dict) -> None:
-    """The same messages in another container."""
-    with source.open("rb") as file, target.open("wb") as out:
-        writer = Writer(out, **options)
-        writer.start("ros2")
-        numbers: dict[int, int] = {}
-        for schema, channel, message in make_reader(file).iter_messages():
-            if channel.id not in numbers:
-                kind = writer.register_schema(schema.name, schema.encoding, schema.data)
-                numbers[channel.id] = writer.register_channel(
-                    channel.topic, channel.message_encoding, kind
-                )
-            writer.add_message(
-                numbers[channel.id], message.log_time, message.data, message.publish_time
-            )
-        writer.finish()
 
 
 def _franka(source: Path, target: Path) -> None:

@@ -88,7 +88,7 @@ class Residuals:
         cutoff: Of the low-pass that the recorded force went through [Hz].
         reference: Centre lines of one rollout [m], shape (K, L, 3).
         samples: Numbers of the force's, shape (S,).
-        picture, bin: Of each bin, which picture's and which along the band, shape (M,).
+        picture: Of each bin, which picture's, shape (M,).
     """
 
     episode: Episode
@@ -144,7 +144,7 @@ class Residuals:
             # what bending and tube add to a bin's mean point, as they do at the reference
             bias = (mean - foot_of_mean) - seen
             pictures = np.full(len(good), number)
-            binned.append((pictures, good, edge_of_mean, mean, depth, np.cross(along, depth), bias))
+            binned.append((pictures, edge_of_mean, mean, depth, np.cross(along, depth), bias))
         if not binned:
             raise UserError(
                 f"episode of {episode.band}: no picture of the drawn band or of its recoil shows"
@@ -152,7 +152,7 @@ class Residuals:
                 " `cloud` in params.yaml"
             )
         columns = zip(*binned, strict=True)
-        self.picture, self.bin, edge, self.point, self.depth, self.side, bias = (
+        self.picture, edge, self.point, self.depth, self.side, bias = (
             np.concatenate(column) for column in columns
         )
         self._bias = np.stack([_dot(bias, self.depth), _dot(bias, self.side)])  # (2, M)

@@ -91,19 +91,14 @@ def search(
 
 def _owner(optimizer: Optimizer, count: int) -> np.ndarray | None:
     """Which of its solvers asked for each point, shape (count,), where it says so."""
-    owner_name = getattr(optimizer, "owner", None)
-    if owner_name is None:
+    owner = getattr(optimizer, "owner", None)
+    if owner is None:
         return None
-    try:
-        owner = np.asarray(owner_name)
-        if owner.shape == (count,) and (owner == owner.astype(np.int32)).all():
-            return owner.astype(np.int32)
-    except (TypeError, ValueError):
-        pass  # it is no array of numbers
-    raise UserError(
-        f"{type(optimizer).__name__}: owner must say by a number for each of {count} points who"
-        f" asked, and is {owner_name!r:.40}"
-    )
+    numbers = np.asarray(owner)
+    if numbers.shape != (count,) or numbers.dtype.kind != "i":
+        name = type(optimizer).__name__
+        raise UserError(f"{name}: owner must be {count} whole numbers, and is {owner!r:.40}")
+    return numbers.astype(np.int32)
 
 
 def _checked(optimizer: Optimizer, dimension: int) -> np.ndarray:

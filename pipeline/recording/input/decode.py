@@ -20,10 +20,7 @@ from pipeline.recording.input.contents import Channel
 Message = Any  # it has the attributes that its schema says, and whoever reads it finds out
 Decoder = Callable[[bytes], Message]
 Value = TypeVar("Value")
-LONGEST = {"json": 2**25}  # bytes of one message: objects of JSON take fifty times as much
-USUAL = 2**27
-LONGEST_SCHEMA = 2**16  # characters of ROS, with all types within; those of robots have a tenth
-MOST_ELEMENTS = 9999
+LONGEST = 2**25  # bytes of one message: a raw 4K picture has less, JSON takes fifty times as much
 # What readers raise where fields are missing, of other types or beyond all bounds.
 UNFIT = (AttributeError, LookupError, TypeError, ValueError, OverflowError)
 
@@ -55,7 +52,6 @@ def decoder(channel: Channel) -> Decoder:
             f"topic {channel.topic}: {what} with messages {channel.encoding!r} cannot be read,"
             f" record one of: {supported}"
         )
-    most = LONGEST.get(channel.encoding, USUAL)
     try:
         if by_name:
             read = standard.reader(schema.name)
@@ -66,10 +62,10 @@ def decoder(channel: Channel) -> Decoder:
         raise UserError(f"topic {channel.topic}: bad schema {schema.name} ({reason})") from error
 
     def bounded(payload: bytes) -> Message:
-        if len(payload) > most:
+        if len(payload) > LONGEST:
             raise Unreadable("a message that is too long")
         try:
-            return read(standard.plain(payload, most) if channel.encoding == "cdr" else payload)
+            return read(standard.plain(payload, LONGEST) if channel.encoding == "cdr" else payload)
         except Exception as error:  # damaged bytes make the libraries raise anything
             raise Unreadable.by(error) from error
 
@@ -82,7 +78,7 @@ def _says_nothing(schema: Schema) -> bool:
         return False
     if schema.encoding in ("", "omgidl"):  # of DDS, whose names of ROS types are as well known
         return True
-    return schema.encoding == "ros2msg" and standard.adds_nothing(schema.name, schema.data)
+    return schema.encoding == "ros2msg" and schema.data.strip() in (b"", schema.name.encode())
 
 
 def message_reader(decode: Decoder, read: Callable[[Message], Value]) -> Callable[[bytes], Value]:
@@ -106,11 +102,6 @@ def _compiled(kind: str, encoding: str, name: str, data: bytes) -> Decoder:
 def _ros(schema: Schema) -> Decoder:
     """Decoder by types of this schema alone, because recordings may mix versions of a type."""
     text = schema.data.decode()
-    if len(text) > LONGEST_SCHEMA:  # rosbags takes minutes for a megabyte
-        raise ValueError(f"longer than {LONGEST_SCHEMA} characters")
-    lengths = map(int, re.findall(r"\[\s*(\d+)\s*\]", text))
-    if sum(lengths) > MOST_ELEMENTS:  # it writes code for each
-        raise ValueError(f"arrays of fixed lengths that are together beyond {MOST_ELEMENTS}")
     # As rosbags has it: with the `msg` that ROS 1 leaves out.
     name = re.sub("^([^/:]+)(/|::)([^/:]+)$", r"\1/msg/\3", schema.name).replace("::", "/")
     store = get_typestore(Stores.EMPTY)

@@ -1,7 +1,7 @@
 """ROS 2 messages without a schema of their own: standard types by name; and packed one by one.
 
-Recorders that do not find the definitions write empty schemas, names alone, or types without those
-that they are made of. The standard types are the same in all distributions of today.
+Recorders that do not find the definitions write empty schemas, or names alone. The standard types
+are the same in all distributions of today.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from rosbags.typesys.store import Typestore
 ZSTD = b"\x28\xb5\x2f\xfd"  # no header of CDR begins so
 XCDR2 = range(0x06, 0x0C)  # second byte: OMG DDS-XTypes 1.3, table 60
 PACKAGES = ("geometry_msgs", "sensor_msgs", "std_msgs", "tf2_msgs")
-RULE = re.compile("^=+$", re.MULTILINE)  # between the types of a schema
 
 
 def name_of(schema: str) -> str:
@@ -31,16 +30,6 @@ def knows(schema: str) -> bool:
     """Whether it is the name of a standard type."""
     name = name_of(schema)
     return name.startswith(PACKAGES) and name in _store().fielddefs
-
-
-def adds_nothing(schema: str, text: bytes) -> bool:
-    """Whether a ros2msg schema of a standard type is empty, its name, or lacks types within it."""
-    first, *others = RULE.split(text.decode(errors="replace"))
-    if first.strip() in ("", schema):
-        return True
-    wanted, _ = _store().generate_msgdef(name_of(schema))
-    lacks = not others and "MSG: " in wanted
-    return lacks and _fields(first) == _fields(RULE.split(wanted)[0])
 
 
 def reader(schema: str) -> Callable[[bytes], Any]:
@@ -70,9 +59,3 @@ def plain(payload: bytes, most: int) -> bytes:
 @lru_cache(1)
 def _store() -> Typestore:
     return get_typestore(Stores.ROS2_HUMBLE)
-
-
-def _fields(text: str) -> list[str]:
-    """Types and names, without comments and constants."""
-    lines = (line.partition("#")[0].split() for line in text.splitlines())
-    return [f"{line[0].rpartition('/')[2]} {line[1]}" for line in lines if len(line) >= 2]

@@ -15,7 +15,6 @@ from pipeline.recording.input.roles import readable
 
 Edge = tuple[str, str]
 FOXGLOVE = ("FrameTransform", "FrameTransforms")
-MOST = 500  # frames; an arm, its hand and cameras have a tenth of them
 STILL = 1e-9  # m and quaternion: a transform that changes by more is no static one
 
 
@@ -23,7 +22,7 @@ def transforms_of(container: Container) -> TransformTree:
     """All of tf_static; of Foxglove's transforms, which share one topic, those that keep still.
 
     Messages that cannot be read are left out: a transform that is missed is asked for later.
-    Raises UserError for more frames than a rig has.
+
     """
     poses: dict[Edge, np.ndarray] = {}
     moving: set[Edge] = set()
@@ -41,8 +40,6 @@ def transforms_of(container: Container) -> TransformTree:
                 moving.add(edge)
             poses[edge] = pose
     still = {edge: pose for edge, pose in poses.items() if edge not in moving}
-    if len(still) > MOST:
-        raise UserError(f"more than {MOST} fixed frames: record /tf_static of this rig alone")
     tree = TransformTree()
     for edge, pose in still.items():
         tree.add(*edge, Transform.of(pose))

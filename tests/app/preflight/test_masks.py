@@ -18,7 +18,7 @@ from app.preflight.recordings import add_recording
 from pipeline.base.errors import UserError
 from tests.app.preflight.test_add_band import add
 from tests.project import contents, with_
-from tests.recording.joined import joined
+from tests.recording.parts import joined
 from validation.recordings.bag import Truth, blind_bag
 
 COLOR = "/camera/color/compressed"

@@ -17,8 +17,7 @@ from pipeline.recording.build import build_episodes
 from stages import episode
 from tests.app.preflight.test_add_band import add
 from tests.project import contents
-from tests.recording.joined import joined
-from tests.recording.split import metadata, split
+from tests.recording.parts import joined, metadata, split
 
 
 @pytest.fixture(scope="module")

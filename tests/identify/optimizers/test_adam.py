@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.identify.optimizers.adam.adam import Adam
-from tests.identify.search.functions import CENTRE, Evaluate, alone, changed, correlated, quadratic
+from tests.identify.search.functions import CENTRE, alone, changed, correlated, quadratic
 
 D = 5
 MATRIX = correlated()
@@ -88,18 +88,3 @@ def test_a_start_that_fails_goes_back() -> None:
     np.testing.assert_array_equal(optimizer.ask()[0], good)
     optimizer.tell(value(optimizer.ask()))
     assert 0 < np.abs(optimizer.ask()[0] - good).max() < 0.6 * first
-
-
-def test_a_corner_is_reached() -> None:
-    """The minimum outside the cube: clamped at its faces, no difference leaves it."""
-    evaluations = alone("adam", quadratic(np.full(D, 1.2), np.eye(D)), 600, changed(population=6))
-    np.testing.assert_allclose(evaluations.unit[np.argmin(evaluations.total)], 1, atol=0.01)
-    assert evaluations.unit.max() <= 1
-
-
-def test_the_budget_is_spent_and_losses_alike_move_nothing() -> None:
-    evaluations = alone(
-        "adam", Evaluate(lambda unit: np.ones(len(unit))), 100, changed(population=20)
-    )
-    assert len(evaluations.total) == 100
-    assert len(np.unique(evaluations.unit[20:], axis=0)) == 3 * (D + 1)

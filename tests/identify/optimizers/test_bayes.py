@@ -45,7 +45,10 @@ def random_points(count: int, dimension: int, seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("function", "names", "rollouts", "least", "near"),
-    [(branin, NAMES[:2], 96, 0.397887, 0.02), (hartmann, (*NAMES, "f"), 144, -3.32237, 0.4)],
+    [
+        (branin, NAMES[:2], 96, 0.397887, 0.02),
+        pytest.param(hartmann, (*NAMES, "f"), 144, -3.32237, 0.4, marks=pytest.mark.slow),
+    ],
 )
 def test_it_beats_random_points(function, names, rollouts: int, least: float, near: float) -> None:
     """By bounds that it keeps with any seed: another CPU's rounding is like another seed."""
@@ -67,6 +70,7 @@ def test_it_goes_round_a_part_that_fails() -> None:
     assert evaluations.total.min() - 1 < (np.median(random) - 1) / 3
 
 
+@pytest.mark.slow
 def test_it_is_silent_and_torch_waits_until_it_is_asked_for() -> None:
     """Though losses are all alike, points need a jitter, and climbs stop after a few steps."""
     code = """

@@ -69,12 +69,6 @@ def test_its_points_are_those_of_scipy(
         optimizer.tell(((requested - 0.3) ** 2).sum(axis=1))
 
 
-def test_its_first_generation_has_one_agent_in_each_stratum() -> None:
-    requested = Evolution(5, rollouts=48, seed=4, population=24).ask()
-    strata = np.sort(np.floor(requested * 24).astype(int), axis=0)
-    np.testing.assert_array_equal(strata, np.tile(np.arange(24)[:, None], 5))
-
-
 def small(population: int = 5, **more) -> Evolution:
     return Evolution(2, rollouts=15, seed=1, population=population, **more)
 

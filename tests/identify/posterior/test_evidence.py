@@ -57,16 +57,12 @@ def test_a_band_without_a_file_has_none(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("draw_y_m,draw_z_m\n-0.3,-0.1\n", "lacks the column landing_y_m"),
         (f"{HEAD},method\n", "unknown column 'method'"),
         (f"{HEAD}\n-0.3,-0.1,0.001,\n", "line 2: a launch that did not land is no evidence"),
-        (f"{HEAD}\n-0.3,,0,1\n", "line 2: a draw needs"),
         (f"{HEAD}\n-0.3,-0.1,,1\n0.3,-0.1,,1\n", "line 3: draw_y_m must lie between -20 and 0 m"),
-        (f"{HEAD}\n-0.3,-0.1,,195\n", "line 2: landing_y_m must lie between 0 and 20 m"),
         (f"{HEAD}\n-0.3,-0.1,1,2\n", "line 2: draw_error_m must be at least 0 and below 0.1 m"),
         (f"{HEAD}\n-0.3,-0.1,-0.001,2\n", "line 2: draw_error_m must be at least 0"),
         (f"{HEAD}\n-0.3,-0.1,nan,2\n", "line 2: draw_error_m must be a number of metres"),
-        (f"{HEAD}\n".encode("utf-16"), "not UTF-8"),
     ],
 )
 def test_refuses_what_teaches_nothing(tmp_path, text: str | bytes, message: str) -> None:

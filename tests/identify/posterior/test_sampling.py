@@ -56,7 +56,7 @@ def integrated(widened: float = 1.0) -> np.ndarray:
     return np.array(result)
 
 
-@pytest.mark.parametrize("widened", [1.0, 1.3])
+@pytest.mark.parametrize("widened", [1.0, pytest.param(1.3, marks=pytest.mark.slow)])
 def test_quantiles_of_a_curved_valley_are_those_of_the_integral(valley, widened):
     """The second factor has a long tail upwards, where the Gaussian is even."""
     (samples, effective, batches), true = samples_of(valley, widened, 3), integrated(widened)
@@ -71,12 +71,6 @@ def test_quantiles_of_a_curved_valley_are_those_of_the_integral(valley, widened)
 def test_a_coordinate_that_nothing_shows_keeps_its_prior(valley):
     last = samples_of(valley, 1.0, 0)[0][:, 2] / SIZE[2]
     assert np.sqrt(np.mean(last**2)) == pytest.approx(5.0, rel=0.15)
-
-
-def test_the_same_seed_gives_the_same_samples(valley):
-    first, again, other = (samples_of(valley, 1.0, seed)[0] for seed in (0, 0, 1))
-    np.testing.assert_array_equal(first, again)
-    assert np.any(other != first)
 
 
 def test_chains_keep_a_normal_density():

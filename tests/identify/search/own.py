@@ -40,7 +40,6 @@ Flat = changed("Flat", ask=lambda self: np.zeros((1, 5)))
 Words = changed("Words", ask=lambda self: [["here", "there"]])
 Crowd = changed("Crowd", owner=(0,))  # of one of its points it says who asked
 Strangers = changed("Strangers", owner=["a"] * 7)
-Halves = changed("Halves", owner=np.full(7, 0.5))
 Nameless = changed("Nameless", phase=3)
 Lost = changed("Lost", __init__=lost)
 Choosy = changed("Choosy", __init__=choosy)

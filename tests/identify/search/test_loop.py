@@ -123,6 +123,7 @@ def test_fixed_axes_keep_their_physical_values() -> None:
     np.testing.assert_allclose(best, CENTRE[[0, 3, 4]], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_one_free_axis_is_enough() -> None:
     evaluate = quadratic(CENTRE[:1], np.eye(1), names=NAMES[:1])
     budget = changed(population=10, generations=5, k_nn=6, k_top=2, cma_rollouts=64)
@@ -145,6 +146,7 @@ def torch_threads():
     torch.set_num_threads(before)
 
 
+@pytest.mark.slow
 def test_an_optimiser_is_deterministic_and_spends_its_budget(torch_threads) -> None:
     """Whatever the threads and global generators, which it leaves alone.
 

@@ -10,7 +10,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.launching.surface.stored import Stored
 from pipeline.policy.export import write_onnx
-from pipeline.policy.train import ProjectilePolicy
+from pipeline.policy.train import Policy
 from tests.policy.linear import write_policy
 
 BOX = SimpleNamespace(low=[-0.45, -0.30], high=[-0.25, -0.10])
@@ -70,7 +70,7 @@ def test_a_card_without_the_start_of_the_projectile_is_one_line(tmp_path) -> Non
     """Of a policy that sees it."""
     policy = stored(tmp_path)
     write(policy, (-0.3, -0.1))
-    seeing = ProjectilePolicy(nn.Sequential(nn.Linear(3, 2)), (1.4, 2.4), BOX, (0.0, -0.22))
+    seeing = Policy(nn.Sequential(nn.Linear(3, 2)), (1.4, 2.4), BOX, (0.0, -0.22))
     write_onnx(seeing, policy.folder / "policy.onnx")
     file = policy.folder / "card.json"
     assert refusal(policy.draws, TARGETS) == f"{file}: lacks the policy's input `projectile`"

@@ -72,6 +72,7 @@ def test_an_unknown_method_stops_the_stage_and_leaves_what_was_there(tried) -> N
     assert Path("data/trials", BAND, f"{METHOD}.parquet").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_rig_band_is_launched_and_measured_launches_stand_apart(tried) -> None:
     yaml = YAML()
     content = yaml.load(Path("params.yaml"))

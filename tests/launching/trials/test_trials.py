@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from pipeline.launching.trials.trials import SCHEMA, Batch, launch_virtually, table
 from pipeline.params import load
@@ -113,6 +114,7 @@ def landed(draw: np.ndarray, number: int) -> SimpleNamespace:
     )
 
 
+@pytest.mark.slow
 def test_landings_outside_the_area_stand_beside_their_failure() -> None:
     draws = np.tile([-0.3, -0.1], (3, 1))
     trial = launch_virtually(Batch("predicted", draws, [1.9, 1.9, 2.1]), landed)

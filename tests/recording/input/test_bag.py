@@ -6,7 +6,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-from mcap.reader import make_reader
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
@@ -16,9 +15,9 @@ from pipeline.recording.input.bag import missing_parts, name_of, once, parts_of,
 from pipeline.recording.input.container import read_container
 from pipeline.recording.input.contents import OVERHEAD
 from pipeline.recording.input.reader import read_recording
-from tests.recording.split import metadata, split
+from tests.recording.parts import metadata, split
 from tests.recording.test_foxglove import assert_same_recording
-from validation.recordings.bag import blind_bag, write_bag
+from validation.recordings.bag import blind_bag, messages_of, write_bag
 
 
 @pytest.fixture
@@ -50,13 +49,10 @@ HUMBLE = get_typestore(Stores.ROS2_HUMBLE)
 @pytest.mark.parametrize("own_types", [True, False])
 def test_the_bag_that_a_library_of_others_writes(own_types, whole, tmp_path, params) -> None:
     """rosbags names its file and writes the metadata; its one part is the recording."""
-    with whole.open("rb") as stream:
-        messages = list(make_reader(stream).iter_messages())
     folder, connections = tmp_path / "other", {}
     plugin = StoragePlugin.MCAP
     with BagWriter(folder, version=9, storage_plugin=plugin) as bag:
-        for schema, channel, message in messages:
-            assert schema
+        for schema, channel, message in messages_of(whole):
             if channel.topic not in connections:
                 given = {"msgdef": schema.data.decode(), "rihs01": RAW}
                 types = {"typestore": HUMBLE} if own_types else given

@@ -28,19 +28,6 @@ def test_a_pose_moves_points(pose, point) -> None:
     np.testing.assert_allclose(Transform.of(pose).apply(point), moved(pose, point), atol=1e-9)
 
 
-@given(poses, poses, vectors)
-def test_composition_is_one_after_the_other(first, second, point) -> None:
-    both = Transform.of(second) @ Transform.of(first)
-    expected = moved(second, moved(first, np.array(point)))
-    np.testing.assert_allclose(both.apply(point), expected, atol=1e-8)
-
-
-@given(poses, vectors)
-def test_the_inverse_leads_back(pose, point) -> None:
-    there = moved(pose, np.array(point))
-    np.testing.assert_allclose(Transform.of(pose).inverse().apply(there), point, atol=1e-8)
-
-
 @given(poses, poses, poses, vectors)
 def test_the_tree_joins_cousins(a, b, c, point) -> None:
     tree = TransformTree()

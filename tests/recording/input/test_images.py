@@ -253,25 +253,3 @@ def test_depth_of_other_encodings_and_without_what_drivers_leave_out() -> None:
         depth(replace(whole, width=0))
     with pytest.raises(Unsupported, match="'8UC1' is not known, use 16UC1"):
         depth(raw("8UC1", MILLIMETRES.astype(np.uint8)))
-
-
-def claiming(width: int, height: int) -> bytes:
-    """A small JPEG whose header claims another size."""
-    data = bytearray(cv2.imencode(".jpg", np.full((8, 8, 3), 90, np.uint8))[1].tobytes())
-    at = data.index(b"\xff\xc0") + 5
-    data[at : at + 4] = struct.pack(">HH", height, width)
-    return bytes(data)
-
-
-@pytest.mark.parametrize(
-    "picture",
-    [
-        packed("jpeg", claiming(65_500, 65_500)),
-        Picture("rgb8", "", np.zeros(100, np.uint8), 65_500, 65_500, 3 * 65_500),
-        Picture("16UC1", "", np.zeros(100, np.uint8), 2**31, 2**31, 2**32),
-    ],
-)
-def test_no_header_gets_the_memory_that_it_claims(picture) -> None:
-    """The limit is LARGEST pixels; the smallest of these would take eight gigabytes."""
-    with pytest.raises(Undecodable, match="65500|2147483648|damaged"):
-        (depth if is_depth(picture) else color)(picture)

@@ -12,7 +12,7 @@ from pipeline.base.errors import UserError
 from pipeline.recording.input import opened
 from pipeline.recording.input.bag import name_of, parts_of
 from pipeline.recording.input.container import read_container
-from tests.recording.split import metadata, split
+from tests.recording.parts import metadata, split
 
 PACKERS = {".zst": zstandard.compress, ".gz": gzip.compress, ".lz4": lz4.frame.compress}
 

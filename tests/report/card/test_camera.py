@@ -17,7 +17,7 @@ from pipeline.recording.input.reader import read_recording
 from pipeline.report.card.camera import Pictures
 from pipeline.report.card.camera_view import CameraView
 from pipeline.report.card.simulated import Simulated, simulate
-from tests.recording.split import split
+from tests.recording.parts import split
 from tests.report.card.conftest import BAND, METHOD, TRUTH
 
 

@@ -1,0 +1,61 @@
+"""Recordings joined into one file, and one that is split into a bag's parts."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import replace
+from pathlib import Path
+
+from validation.recordings.bag import messages_of, write_again
+
+STAMP = struct.Struct("<iI")  # header.stamp, behind the four bytes that begin a CDR message
+
+
+def joined(path: Path, recordings: list[Path], gap: float = 0.01) -> list[float]:
+    """Write ROS 2 recordings into one file as if each had begun `gap` [s] after the one before.
+
+    Every stamp and time of receipt of a recording is moved alike; /tf_static is the first one's.
+
+    Returns:
+        By how much each was moved [s].
+    """
+    moved, together, end = [], [], 0
+    for recording in recordings:
+        messages = messages_of(recording)
+        first = min(message.log_time for *_, message in messages)
+        shift = end + round(gap * 1e9) - first if moved else 0
+        for schema, channel, message in messages:
+            data, received = message.data, message.log_time + shift
+            if channel.topic != "/tf_static":
+                seconds, nanoseconds = STAMP.unpack_from(data, 4)
+                stamp = divmod(seconds * 10**9 + nanoseconds + shift, 10**9)
+                data = data[:4] + STAMP.pack(*stamp) + data[4 + STAMP.size :]
+            elif moved:
+                continue
+            shifted = replace(message, data=data, log_time=received, publish_time=received)
+            together.append((schema, channel, shifted))
+        moved.append(shift * 1e-9)
+        end = max(message.log_time for *_, message in messages) + shift
+    write_again(together, path)
+    return moved
+
+
+def split(file: Path, folder: Path, cuts: tuple[float, ...], stem: str = "my") -> list[Path]:
+    """The parts of a recording that was split so many seconds after its start."""
+    folder.mkdir(parents=True, exist_ok=True)
+    messages = messages_of(file)
+    start, parts = messages[0][2].log_time, []
+    edges = [-1.0, *cuts, 1e9]
+    for number, (low, high) in enumerate(zip(edges, edges[1:], strict=False)):
+        within = [m for m in messages if low <= (m[2].log_time - start) * 1e-9 < high]
+        parts.append(folder / f"{stem}_{number}.mcap")
+        write_again(within, parts[-1])
+    return parts
+
+
+def metadata(folder: Path, *names: str) -> None:
+    """As rosbag2 writes it, but for what is not read."""
+    fields = {"version": 5, "storage_identifier": "mcap", "relative_file_paths": list(names)}
+    text = json.dumps({"rosbag2_bagfile_information": fields})  # JSON is YAML
+    (folder / "metadata.yaml").write_text(text)

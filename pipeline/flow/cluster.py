@@ -24,12 +24,12 @@ from pipeline.base.errors import UserError, one_line
 from pipeline.base.machine import cores, workers
 from pipeline.flow import dvc
 
-SLOTS = 16  # stages at a time, each of which has DVC wait here
-
 
 @contextmanager
 def there(dask: str | None, slurm: Path | None) -> Iterator[tuple[dict[str, str], int | None]]:
     """What in a stage's environment hands it over, and how many stages at a time; or nothing.
+
+    Each of them has DVC wait here, so they are few.
 
     Args:
         dask: Address of a scheduler.
@@ -48,10 +48,10 @@ def there(dask: str | None, slurm: Path | None) -> Iterator[tuple[dict[str, str]
         cluster: Any = SLURMCluster(scheduler_options={"dashboard": False})
         with cluster:
             cluster.adapt()
-            yield {"SLING_DASK": cluster.scheduler_address}, SLOTS
+            yield {"SLING_DASK": cluster.scheduler_address}, 16
     elif dask:
         connected(dask).close()
-        yield {"SLING_DASK": dask}, SLOTS
+        yield {"SLING_DASK": dask}, 16
     else:
         yield {}, None
 

@@ -142,15 +142,15 @@ def repro(
     """
     if _ending.is_set():
         raise StageFailed(f"{target}: interrupted")
-    name, output = target, []
+    begin, output = 0, []
     command = [*DVC, "repro", *options, target]
     process = subprocess.Popen(command, cwd=root, env=env or environment(), **PIPED)
     _running.add(process)
     try:
         for line in map(str.rstrip, process.stdout or ()):
             output.append(line)
-            if begun := re.fullmatch("Running stage '(.+)':", line):
-                name = begun[1]
+            if line.startswith("Running stage '"):
+                begin = len(output)
             if line and not CHATTER.match(line) and not line.startswith("ERROR: failed to repro"):
                 on_line(line)
         process.wait()
@@ -158,7 +158,8 @@ def repro(
         _end([process])
         _running.discard(process)
     if process.returncode:
-        raise StageFailed(with_disk(f"{name}: {cause(output, process.returncode)}", root))
+        name = [target, *re.findall("failed to reproduce '(.+?)'", "\n".join(output))][-1]
+        raise StageFailed(with_disk(f"{name}: {cause(output[begin:], process.returncode)}", root))
     return output
 
 
@@ -187,7 +188,7 @@ def cause(output: Sequence[str], status: int) -> str:
     """Why a DVC command failed: the stage's line of error, its signal or exit status, or DVC's.
 
     Args:
-        output: All that it and its stages said, in lines.
+        output: What it and its last stage said, in lines.
         status: Its exit status.
     """
     said = [line for line in output if line and not CHATTER.match(line)]

@@ -1,0 +1,100 @@
+"""What DVC says of stages, and why one of its commands failed."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from pipeline.base.errors import UserError
+from pipeline.flow.dvc import StageFailed, cause, named, repro, stale
+from tests.flow.toy import Toy, stage
+
+STAGES = ("theta@band1-paper", "ablation_theta@band1-de", "report")
+RUNS = ("Running stage 'one':", "> sh one")
+
+
+@pytest.mark.parametrize(
+    ("target", "found"),
+    [
+        ("theta@band1-paper", {STAGES[0]}),
+        ("theta@band1-de", {STAGES[1]}),
+        ("theta", {STAGES[0]}),
+        ("ablation_theta", {STAGES[1]}),
+        ("report", {STAGES[2]}),
+    ],
+)
+def test_a_target_is_a_stage_or_a_step_in_whatever_group(target: str, found: set[str]) -> None:
+    assert named(target, STAGES) == found
+
+
+@pytest.mark.parametrize("target", ["band1-de", "port", "theta@", "theta@band1-d."])
+def test_any_other_target_is_refused(target: str) -> None:
+    with pytest.raises(UserError, match="no stage of dvc.yaml; `dvc stage list` has all"):
+        named(target, STAGES)
+
+
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [
+        (("error: mass: is 0", "failed with: 1"), "mass: is 0"),
+        (("Traceback", "KeyError: 'a'", "failed with: 1"), "KeyError: 'a' (exit status 1)"),
+        (("failed with: 3",), "said nothing (exit status 3)"),
+        (("half a line", "failed with: -9"), "was killed by signal 9"),
+        (("half a line", "failed with: 137"), "was killed by signal 9"),
+        (("ERROR: failed to reproduce 'one': a.txt does not exist",), "a.txt does not exist"),
+        (("ERROR: failed to reproduce 'one': 'a' is busy:", "  (PID 1)"), "'a' is busy: (PID 1)"),
+        (("ERROR: not inside of a DVC repository",), "not inside of a DVC repository"),
+    ],
+)
+def test_why_a_command_failed(lines: tuple[str, ...], expected: str) -> None:
+    """The last line is what DVC says of a stage's exit status."""
+    *own, last = lines
+    if last.startswith("failed with: "):
+        last = f"ERROR: failed to reproduce 'one': failed to run: sh one, exited with {last[13:]}"
+    assert cause([*RUNS, *own, last], 255) == expected
+
+
+@pytest.fixture
+def toy(tmp_path: Path) -> Toy:
+    stages = {
+        "one": stage("echo 1 >> runs; echo 1 > one.txt", "one.txt"),
+        "two": stage("echo line; cp one.txt two.txt", "two.txt", "one.txt", meta={"gpu": True}),
+        "three": stage("[ ! -e bad ] && cp two.txt three.txt", "three.txt", "two.txt"),
+        "other": stage("echo 1 > other.txt", "other.txt"),
+    }
+    return Toy(tmp_path, stages)
+
+
+@pytest.mark.slow
+def test_one_command_runs_what_a_stage_needs(toy: Toy) -> None:
+    """As `sling fit` calls it: the stages' lines, and the name of the one that failed."""
+    graph = stale(toy.folder, ["two"])
+    assert {*graph} == {"one", "two"} and {*graph.edges} == {("one", "two")}
+    assert (graph.nodes["one"]["gpu"], graph.nodes["two"]["gpu"]) == (False, True)
+    (toy.folder / "bad").touch()
+    lines: list[str] = []
+    with pytest.raises(StageFailed, match=r"^three: said nothing \(exit status 1\)$"):
+        repro(toy.folder, "three", lines.append)
+    assert lines == [*(f"Running stage '{name}':" for name in ("one", "two")), "line"] + [
+        "Running stage 'three':"
+    ]
+    assert {*stale(toy.folder)} == {"three", "other"}
+
+
+@pytest.mark.slow
+def test_a_lock_that_was_cut_off_is_one_line_and_gits_brings_back_what_is_done(toy: Toy) -> None:
+    lock = toy.folder / "dvc.lock"
+    repro(toy.folder, "one", lambda line: None)
+    for command in ("git add -A", "git -c user.name=a -c user.email=a@b commit -qm one"):
+        subprocess.run(command.split(), cwd=toy.folder, check=True)
+    repro(toy.folder, "three", lambda line: None)
+    whole = lock.read_text()
+    lock.write_text(whole[:10])
+    for run in (lambda: stale(toy.folder), lambda: repro(toy.folder, "three", lambda line: None)):
+        with pytest.raises(UserError, match="dvc.lock was cut off .* `git checkout dvc.lock`"):
+            run()
+    subprocess.run(["git", "checkout", "-q", "dvc.lock"], cwd=toy.folder, check=True)
+    assert {*stale(toy.folder)} == {"two", "three", "other"}
+    output = repro(toy.folder, "three", lambda line: None)
+    assert sum("is cached - skipping run" in line for line in output) == 2
+    assert lock.read_text() == whole and toy.read("runs") == "1"

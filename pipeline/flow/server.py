@@ -8,6 +8,7 @@ import socket
 import sys
 import urllib.request
 from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 
 from pipeline.base.errors import UserError
@@ -41,6 +42,8 @@ def environment(root: Path) -> dict[str, str]:
 
 def serve(root: Path, port: int = PORT) -> str:
     """Become Prefect's server, or say where the project's runs already. Raises UserError."""
+    if find_spec("prefect") is None:
+        raise ModuleNotFoundError(name="prefect")
     if where := address(root):
         return f"the UI of this project runs already: {where}"
     try:

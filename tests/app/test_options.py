@@ -55,6 +55,7 @@ CASES = {
     "export --band": (EXPORT, EXPORT.replace("mine", "band2")),
     "export --to": (EXPORT, EXPORT.replace("mjcf", "usd")),
     "remove-band name": ("remove-band mine --yes", "remove-band band1 --yes"),
+    "flow targets": ("flow", "flow theta@band1-paper"),
     "reset keys": ("reset", "reset setup.tips"),
     "--version": ("flow", "--version"),
 }
@@ -79,7 +80,7 @@ ADDED = {
     OBSERVE.removesuffix(" --no-run"): "--no-run",
     EXPORT: "--method de, --out there, --json",
     "remove-band mine": "--yes",
-    "flow": "theta@band1-paper, --workers 2, --gpus 2, --dask nowhere:8786, --slurm none.yaml",
+    "flow": "--workers 2, --gpus 2, --dask nowhere:8786, --slurm none.yaml",
     "ui": "--port 4300",
     "verify": "--device cuda:0",
     "bench": "--device cuda:0, --law rubber, --json",

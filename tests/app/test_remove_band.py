@@ -61,33 +61,6 @@ def test_all_of_a_band_goes_and_nothing_else(project: Path) -> None:
     assert (project / "params.yaml").read_text("utf-8") == DEFAULTS.read_text("utf-8")
 
 
-def test_dvcs_entries_of_its_stages_go_too(project: Path, monkeypatch) -> None:
-    monkeypatch.setenv("DVC_SITE_CACHE_DIR", str(project / "site"))
-    (project / ".dvc").mkdir()
-    (project / ".dvc" / "config").write_text("[core]\n    no_scm = true\n")
-    stages = "episode@orange", "theta@orange-least_squares", "episode@orange_2", "report"
-    head, *entries = "schema: '2.0'\nstages:\n", *(f"  {name}:\n    cmd: yes\n" for name in stages)
-    lock = project / "dvc.lock"
-    lock.write_text(head + "".join(entries))
-    remove_band("orange", lambda lines: True, project)
-    assert lock.read_text() == head + "".join(entries[2:])
-    lock.write_text(head + entries[2])
-    remove_band("orange_2", lambda lines: True, project)
-    assert not lock.exists()  # DVC reads none without stages
-
-
-def test_where_dvc_refuses_nothing_is_removed(project: Path, monkeypatch) -> None:
-    def refuse(*of) -> None:
-        raise UserError("DVC is busy")
-
-    put(project, "orange")
-    before = contents(project)
-    monkeypatch.setattr(module, "drop", refuse)
-    with pytest.raises(UserError, match="DVC is busy"):
-        remove_band("orange", lambda lines: True, project)
-    assert contents(project) == before
-
-
 @pytest.mark.parametrize(
     ("name", "answer", "message"),
     [

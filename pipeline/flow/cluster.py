@@ -41,10 +41,11 @@ def there(dask: str | None, slurm: Path | None) -> Iterator[tuple[dict[str, str]
     """
     if slurm:
         from dask import config
-        from dask_jobqueue import SLURMCluster
+        from dask_jobqueue.slurm import SLURMCluster
 
         config.update(config.config, config.collect(paths=[str(slurm)], env={}))
-        with SLURMCluster(scheduler_options={"dashboard": False}) as cluster:
+        jobs: Any = SLURMCluster(scheduler_options={"dashboard": False})
+        with jobs as cluster:
             cluster.adapt()
             yield {"SLING_DASK": cluster.scheduler_address}, SLOTS
     elif dask:

@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 from queue import SimpleQueue
+from typing import Any
 
 import networkx
 from prefect import flow, get_run_logger, task
@@ -46,9 +47,12 @@ def perform(
 
     @task(cache_policy=NO_CACHE)
     def stage(name: str) -> State:
-        return _repro(root, name, env | ({"SLING_ON_GPU": "1"} if graph.nodes[name]["gpu"] else {}))
+        of_gpu = {"SLING_ON_GPU": "1"} if graph.nodes[name]["gpu"] else {}
+        return _repro(root, name, {**env, **of_gpu})
 
-    @flow(name="sling flow", task_runner=ThreadPoolTaskRunner(max_workers=workers))
+    runner: Any = ThreadPoolTaskRunner(max_workers=workers)  # its type does not fit Prefect's own
+
+    @flow(name="sling flow", task_runner=runner)
     def sling_flow(stages: list[str]) -> State:
         waiting, futures, ended = [*stages], {}, SimpleQueue()
         try:
@@ -56,7 +60,7 @@ def perform(
                 for name in [n for n in waiting if states.keys() >= {*graph.predecessors(n)}]:
                     waiting.remove(name)
                     tags = [GPU] if gpus and graph.nodes[name]["gpu"] else []
-                    named = stage.with_options(task_run_name=name, tags=tags)
+                    named: Any = stage.with_options(task_run_name=name, tags=tags)
                     producers = [futures[producer] for producer in graph.predecessors(name)]
                     futures[name] = named.submit(name, wait_for=producers)
                     futures[name].add_done_callback(lambda _, name=name: ended.put(name))
@@ -77,7 +81,7 @@ def perform(
             client.update_global_concurrency_limit(f"tag:{GPU}", free)
     # Who has most to follow comes first, and so producers before consumers.
     order = sorted(graph, key=lambda name: -len(networkx.descendants(graph, name)))
-    sling_flow(order, return_state=True)
+    sling_flow(order, return_state=True)  # pyright: ignore[reportCallIssue]
     return states
 
 

@@ -19,17 +19,17 @@ from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-BUDGETS = {
-    "pipeline": 20_200,
-    "app": 5_400,
+BUDGETS = {  # what was reached on 2026-11-28, plus 2 %; the whole is as asked
+    "pipeline": 21_000,
+    "app": 3_710,
     "sling2sim2real": 925,
-    "stages": 640,
-    "rig": 1_960,
-    "validation": 7_700,
-    "tests": 21_000,
-    "tools": 900,
-    "examples": 500,
-    "all": 58_000,
+    "stages": 551,
+    "rig": 1_940,
+    "validation": 7_210,
+    "tests": 21_490,
+    "tools": 551,
+    "examples": 525,
+    "all": 57_940,
 }
 COMMENTS = {  # by suffix: what is no code
     ".h": re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL),

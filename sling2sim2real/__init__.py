@@ -14,56 +14,9 @@ target, z up. Nothing is read from or written to disk but by functions that take
 is a `UserError` of one line.
 """
 
-from importlib import metadata
+import lazy_loader
 
-from sling2sim2real import own  # noqa: F401 - before all that imports `pipeline`
+__version__ = "0.2.0"
 
-# isort: split
-from pipeline.base.errors import UserError
-from pipeline.episode.episode import Episode
-from pipeline.identify.posterior.launches import Observed
-from pipeline.identify.results.mounting import Mounting
-from pipeline.simulator.model import LaunchHistory
-from sling2sim2real.episodes import episode_from_arrays, read_mcap
-from sling2sim2real.exporting import Exported, export
-from sling2sim2real.identification import Identification, Interval, identify
-from sling2sim2real.launching import Aim, Launch, aim, launch
-from sling2sim2real.model import Band, Model, Theta
-from sling2sim2real.objective import Objective
-from sling2sim2real.rehearsal import rehearse
-from sling2sim2real.settings import Settings
-from sling2sim2real.simulation import Simulation, pull, simulate, simulate_batch
-
-__all__ = [
-    "Aim",
-    "Band",
-    "Episode",
-    "Exported",
-    "Identification",
-    "Interval",
-    "Launch",
-    "LaunchHistory",
-    "Model",
-    "Mounting",
-    "Objective",
-    "Observed",
-    "Settings",
-    "Simulation",
-    "Theta",
-    "UserError",
-    "aim",
-    "episode_from_arrays",
-    "export",
-    "identify",
-    "launch",
-    "pull",
-    "read_mcap",
-    "rehearse",
-    "simulate",
-    "simulate_batch",
-]
-
-try:
-    __version__ = metadata.version("sling2sim2real")
-except metadata.PackageNotFoundError:  # run from a folder that was never installed
-    __version__ = "unknown"
+# What is there, and where: __init__.pyi. A module is imported when its first name is used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

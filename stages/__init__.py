@@ -8,8 +8,8 @@ import gc
 import os
 import sys
 
-from pipeline.base import home
-from pipeline.base.errors import UserError
+from sling2sim2real.base import home
+from sling2sim2real.base.errors import UserError
 
 gc.set_threshold(100_000)  # while torch loads, a tenth or more of the time looked for garbage
 

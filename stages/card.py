@@ -8,8 +8,8 @@ reports/bands/<band>/.
 
 from __future__ import annotations
 
-from pipeline.base.layout import Layout
-from pipeline.report.card.write import write
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.card.write import write
 from stages.start import run, started
 
 

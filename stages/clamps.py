@@ -7,12 +7,12 @@ Reads data/episodes/<band>/; writes data/clamps/<band>.json.
 
 from __future__ import annotations
 
-from pipeline.base.files import write_json
-from pipeline.base.layout import Layout
-from pipeline.base.machine import cores
-from pipeline.identify.clamps import calibrate_clamps
-from pipeline.identify.objective.session import load_episode
-from pipeline.simulator.model import ClampedBand
+from sling2sim2real.base.files import write_json
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.base.machine import cores
+from sling2sim2real.identification.clamps import calibrate_clamps
+from sling2sim2real.identification.objective.session import load_episode
+from sling2sim2real.simulator.model import ClampedBand
 from stages.start import run, started
 
 

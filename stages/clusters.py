@@ -8,10 +8,10 @@ start in each region.
 
 from __future__ import annotations
 
-from pipeline.base.layout import Layout, made
-from pipeline.identify.search.evaluations import Evaluations
-from pipeline.identify.search.regions import regions_of, save_regions
-from pipeline.params.identification import parameter_names
+from sling2sim2real.base.layout import Layout, made
+from sling2sim2real.identification.search.evaluations import Evaluations
+from sling2sim2real.identification.search.regions import regions_of, save_regions
+from sling2sim2real.settings.identification import parameter_names
 from stages.start import run, started
 
 

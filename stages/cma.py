@@ -10,13 +10,13 @@ samples. Killed, it begins anew. SLING_DEVICE and SLING_WORKERS say where it run
 
 from __future__ import annotations
 
-from pipeline.base.layout import Layout, made
-from pipeline.identify.objective.session import load_episode, logging_evaluator
-from pipeline.identify.optimizers.cma.refine import refine
-from pipeline.identify.results.confidence_file import law_entries, save_confidence
-from pipeline.identify.search.evaluations import Evaluations
-from pipeline.identify.search.regions import load_regions
-from pipeline.params.identification import parameter_names
+from sling2sim2real.base.layout import Layout, made
+from sling2sim2real.identification.objective.session import load_episode, logging_evaluator
+from sling2sim2real.identification.optimizers.cma.refine import refine
+from sling2sim2real.identification.results.confidence_file import law_entries, save_confidence
+from sling2sim2real.identification.search.evaluations import Evaluations
+from sling2sim2real.identification.search.regions import load_regions
+from sling2sim2real.settings.identification import parameter_names
 from stages.start import run, started
 
 

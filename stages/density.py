@@ -10,16 +10,16 @@ data/confidence/<band>/<method>.json.
 
 from __future__ import annotations
 
-from pipeline.base.layout import Layout, made
-from pipeline.base.machine import workers
-from pipeline.identify.density import entries_of, evaluated_mode
-from pipeline.identify.objective.session import load_episodes
-from pipeline.identify.posterior.evidence import load_observed
-from pipeline.identify.posterior.identify import fit_posterior
-from pipeline.identify.results.confidence_file import save_confidence
-from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.search.evaluations import Evaluations
-from pipeline.params.identification import parameter_names
+from sling2sim2real.base.layout import Layout, made
+from sling2sim2real.base.machine import workers
+from sling2sim2real.identification.density import entries_of, evaluated_mode
+from sling2sim2real.identification.objective.session import load_episodes
+from sling2sim2real.identification.posterior.evidence import load_observed
+from sling2sim2real.identification.posterior.identify import fit_posterior
+from sling2sim2real.identification.results.confidence_file import save_confidence
+from sling2sim2real.identification.results.mounting import sling_of_method
+from sling2sim2real.identification.search.evaluations import Evaluations
+from sling2sim2real.settings.identification import parameter_names
 from stages.start import run, started
 
 

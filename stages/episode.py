@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import sys
 
-from pipeline.base.errors import UserError
-from pipeline.base.files import replacing_folder
-from pipeline.base.layout import Layout, NotMade
-from pipeline.recording.input.bag import once
-from pipeline.recording.stored import forget, load_or_build
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.files import replacing_folder
+from sling2sim2real.base.layout import Layout, NotMade
+from sling2sim2real.recording.input.bag import once
+from sling2sim2real.recording.stored import forget, load_or_build
 from stages.start import run, started
 
 

@@ -9,10 +9,10 @@ where there are launches does observed.json say how the lab launches, for the de
 
 from __future__ import annotations
 
-from pipeline.base.launch_table import expect_apart
-from pipeline.base.layout import Layout
-from pipeline.identify.posterior.evidence import read_evidence, save_observed
-from pipeline.launching.trials.measured import read_scores, save_scores
+from sling2sim2real.base.launch_table import expect_apart
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.identification.posterior.evidence import read_evidence, save_observed
+from sling2sim2real.launching.trials.measured import read_scores, save_scores
 from stages.start import run, started
 
 

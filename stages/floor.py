@@ -12,12 +12,12 @@ from __future__ import annotations
 
 import sys
 
-from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
-from pipeline.base.layout import Layout
 from rig.oracle.aim import least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.world import World
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.files import write_json
+from sling2sim2real.base.layout import Layout
 from stages.start import run, started
 
 

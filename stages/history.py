@@ -10,9 +10,9 @@ SLING_WORKERS say where it runs.
 
 from __future__ import annotations
 
-from pipeline.base.layout import Layout
-from pipeline.identify.objective.session import logging_evaluator
-from pipeline.identify.search.explore import explore, rollouts_of
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.identification.objective.session import logging_evaluator
+from sling2sim2real.identification.search.explore import explore, rollouts_of
 from stages.start import run, started
 
 

@@ -12,18 +12,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.base.layout import Layout
-from pipeline.base.machine import devices, kind
-from pipeline.base.progress import Progress
-from pipeline.identify.results.theta import load_theta
-from pipeline.launching.surface.landing_map import LandingMap, validation
-from pipeline.launching.surface.simulated import SimulatedLandings
-from pipeline.launching.surface.simulator import asked_of_the_hand, simulator
-from pipeline.launching.surface.stored import Stored
-from pipeline.policy.check import check, figures, verdict
-from pipeline.policy.environment import projectile_start
-from pipeline.policy.export import export
-from pipeline.policy.train import train
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.base.machine import devices, kind
+from sling2sim2real.base.progress import Progress
+from sling2sim2real.identification.results.theta import load_theta
+from sling2sim2real.launching.surface.landing_map import LandingMap, validation
+from sling2sim2real.launching.surface.simulated import SimulatedLandings
+from sling2sim2real.launching.surface.simulator import asked_of_the_hand, simulator
+from sling2sim2real.launching.surface.stored import Stored
+from sling2sim2real.policy.check import check, figures, verdict
+from sling2sim2real.policy.environment import projectile_start
+from sling2sim2real.policy.export import export
+from sling2sim2real.policy.train import train
 from stages.start import run, started
 
 EVERY = 1.0  # s, between two lines of a training

@@ -5,9 +5,9 @@ python -m stages.record band1
 
 from __future__ import annotations
 
-from pipeline.base.errors import UserError
-from pipeline.base.layout import Layout
 from rig.recorder.record import record
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.layout import Layout
 from stages.start import run, started
 
 

@@ -10,10 +10,10 @@ samples. Killed, it begins anew. SLING_DEVICE and SLING_WORKERS say where it run
 
 from __future__ import annotations
 
-from pipeline.base.layout import Layout
-from pipeline.identify.objective.session import load_episode, logging_evaluator
-from pipeline.identify.results.confidence_file import law_entries, save_confidence
-from pipeline.identify.search.explore import explore, rollouts_of
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.identification.objective.session import load_episode, logging_evaluator
+from sling2sim2real.identification.results.confidence_file import law_entries, save_confidence
+from sling2sim2real.identification.search.explore import explore, rollouts_of
 from stages.start import run, started
 
 

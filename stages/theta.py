@@ -9,12 +9,12 @@ best of all evaluations, and "confidence" is null.
 
 from __future__ import annotations
 
-from pipeline.base.files import write_json
-from pipeline.base.layout import Layout, made
-from pipeline.identify.results.confidence_file import load_confidence
-from pipeline.identify.search.evaluations import Evaluations, theta_content
-from pipeline.params.identification import parameter_names
-from pipeline.params.provenance import settings_of
+from sling2sim2real.base.files import write_json
+from sling2sim2real.base.layout import Layout, made
+from sling2sim2real.identification.results.confidence_file import load_confidence
+from sling2sim2real.identification.search.evaluations import Evaluations, theta_content
+from sling2sim2real.settings.identification import parameter_names
+from sling2sim2real.settings.provenance import settings_of
 from stages.start import run, started
 
 

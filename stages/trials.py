@@ -12,14 +12,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.base.layout import Layout
-from pipeline.episode.episode import Episode
-from pipeline.identify.results.theta import load_samples, load_theta, parameters_of
-from pipeline.launching.surface.simulator import simulator
-from pipeline.launching.surface.stored import Stored
-from pipeline.launching.trials import trials
-from pipeline.launching.trials.measured import load_scores
-from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.identification.results.theta import load_samples, load_theta, parameters_of
+from sling2sim2real.launching.surface.simulator import simulator
+from sling2sim2real.launching.surface.stored import Stored
+from sling2sim2real.launching.trials import trials
+from sling2sim2real.launching.trials.measured import load_scores
+from sling2sim2real.launching.trials.stretch import recorded_stretch, stretch_of
 from stages.start import run, started
 
 

@@ -8,8 +8,8 @@ import sys
 import pytest
 from hypothesis import settings
 
-from pipeline.params import Params, load
-from tests.project import DEFAULTS, ROOT
+from sling2sim2real.settings import Params, load
+from tests.project import DEFAULTS
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as stages have it; nothing has imported NumPy yet
 
@@ -18,17 +18,6 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as stages have it; nothing has impor
 # time, for what fails on one machine should fail on another.
 settings.register_profile("quick", deadline=None, derandomize=True, max_examples=20)
 settings.register_profile("thorough", deadline=None, derandomize=True, max_examples=200)
-
-OF_A_USER = {f"{ROOT}/params.yaml", f"{ROOT}/sling2sim2real/params.yaml"}
-
-
-def leave_the_users_file(event: str, args: tuple) -> None:
-    """The project may be in use: no test may depend on what somebody sets in its params.yaml."""
-    if event == "open" and isinstance(args[0], str) and args[0].endswith("params.yaml"):
-        assert os.path.abspath(args[0]) not in OF_A_USER, "tests take DEFAULTS of tests/project.py"
-
-
-sys.addaudithook(leave_the_users_file)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -65,17 +54,6 @@ def nowhere(tmp_path_factory):
 @pytest.fixture(scope="session")
 def params() -> Params:
     return load(DEFAULTS)
-
-
-@pytest.fixture(scope="session")
-def delivered():
-    """`Settings.default()` is as delivered: it has the project's params.yaml otherwise."""
-    from sling2sim2real import settings
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(settings, "files", lambda package: DEFAULTS.parent)
-        settings._defaults.cache_clear()
-        yield
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.base.errors import UserError
+from sling2sim2real.base.errors import UserError
 
 GONE = object()
 JUNK = (GONE, None, float("nan"), -1e300, "<script>\x1b[2J\n", [], {}, True, [[1.0]], 10**400)

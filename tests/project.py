@@ -9,9 +9,9 @@ from typing import Any
 import psutil
 from ruamel.yaml import YAML
 
-from pipeline.base.code import ROOT
-from pipeline.params.identification import steps_of
-from pipeline.params.lab import StepParams
+from sling2sim2real.base.code import ROOT
+from sling2sim2real.settings.identification import steps_of
+from sling2sim2real.settings.lab import StepParams
 from validation.projects import DEFAULTS, environment, wait
 
 # What params.yaml has of a band of one's own.
@@ -98,11 +98,6 @@ def until(happens: Callable[[], object], seconds: float = 90.0):
     result = wait(happens, seconds)
     assert result, f"it did not come to pass within {seconds} s"
     return result
-
-
-def in_use() -> bool:
-    """Whether the project's params.yaml is another than the delivered one."""
-    return subprocess.run(["cmp", "-s", ROOT / "params.yaml", DEFAULTS]).returncode != 0
 
 
 def alive(pid: int) -> bool:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from pipeline.base.errors import EXTRAS as TOLD
+from sling2sim2real.base.errors import EXTRAS as TOLD
 from tests.project import ROOT, texts
 
 OURS = {
@@ -30,9 +30,9 @@ OURS = {
 # By path, extras that come beside what everybody has.
 EXTRAS = {
     "pipeline/flow/cluster.py": "cluster",
-    "pipeline/export/mujoco_replay.py": "validation",
-    "pipeline/export/newton_band.py": "validation",
-    "app/preflight/timeline.py": "rerun",
+    "sling2sim2real/exporting/mujoco_replay.py": "validation",
+    "sling2sim2real/exporting/newton_band.py": "validation",
+    "sling2sim2real/cli/preflight/timeline.py": "rerun",
     "examples/sam3_masks.py": "sam3",
     "tests/examples/test_sam3_masks.py": "sam3",
     "tests/examples/tiny_sam3.py": "sam3",
@@ -40,15 +40,15 @@ EXTRAS = {
     "tests/recording/input/test_kinematics.py": "validation",  # skipped where that is missing
     "tests/recording/masks/": "validation",
     "tests/validation/": "validation",
-    "tests/export/": "validation",
-    "tests/app/preflight/": "validation",
+    "tests/exporting/": "validation",
+    "tests/cli/preflight/": "validation",
     "tests/rig/recorder/test_record.py": "validation",
     "tools/": "dev",
     "tools/site.py": "docs",
     "validation/": "validation",
     "validation/campaigns/": "dev",
     "validation/recordings/": "dev",
-    "validation/engines/physx/": "physx",
+    "sling2sim2real/engines/physx/": "physx",
 }
 ELSEWHERE = "examples/franka/"  # runs in environments of its own: franky's, and ROS 2
 INSTALLED_AS = {
@@ -165,10 +165,10 @@ class Absent:
         if name.partition(".")[0] in absent:
             raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 sys.meta_path.insert(0, Absent())
-import app.aim, app.export, app.launch, app.plan, app.preflight
+from sling2sim2real.cli import aim, export, launch, plan, preflight
 import sling2sim2real as s2s
 s2s.identify, s2s.aim, s2s.launch, s2s.read_mcap
-from app.cli import main
+from sling2sim2real.cli.cli import main
 sys.argv = ["sling", *{words!r}]
 main()
 """

@@ -3,7 +3,7 @@
 DVC re-runs a stage when something listed changes; it cannot see Python's imports. This follows what
 a stage's script imports, at any depth and inside functions too, and lists the folder of each such
 file: one folder a concern. Two things are nobody's dependency, for no result depends on them but
-by the values in params.yaml, which DVC tracks by themselves: pipeline/params/, which holds no
+by the values in params.yaml, which DVC tracks by themselves: sling2sim2real/settings/, with no
 default, and stages/start.py, which reads the arguments. Optimisers are found by name, so that no
 import says which of them a stage runs: their folders are listed by hand.
 
@@ -24,9 +24,9 @@ from ruamel.yaml import YAML
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from pipeline.base.code import CODE, UNTRACKED, closure, concern  # noqa: E402
+from sling2sim2real.base.code import CODE, UNTRACKED, closure, concern  # noqa: E402
 
-BY_NAME = "pipeline/identify/optimizers/"
+BY_NAME = "sling2sim2real/identification/optimizers/"
 
 
 def folders(script: Path, root: Path = ROOT) -> list[str]:

@@ -20,17 +20,17 @@ from PIL import Image, ImageDraw
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from pipeline.base import errors  # noqa: E402
-from pipeline.base.errors import UserError  # noqa: E402
-from pipeline.base.layout import Layout, made  # noqa: E402
-from pipeline.episode.episode import Episode  # noqa: E402
-from pipeline.identify.results.theta import load_theta  # noqa: E402
-from pipeline.params import load  # noqa: E402
-from pipeline.report.card import animation  # noqa: E402
-from pipeline.report.card.animation import Frame, ReleaseFrames, font, save  # noqa: E402
-from pipeline.report.card.camera import Pictures  # noqa: E402
-from pipeline.report.card.simulated import simulate  # noqa: E402
-from pipeline.report.drawing.styles import INK  # noqa: E402
+from sling2sim2real.base import errors  # noqa: E402
+from sling2sim2real.base.errors import UserError  # noqa: E402
+from sling2sim2real.base.layout import Layout, made  # noqa: E402
+from sling2sim2real.card import animation  # noqa: E402
+from sling2sim2real.card.animation import Frame, ReleaseFrames, font, save  # noqa: E402
+from sling2sim2real.card.camera import Pictures  # noqa: E402
+from sling2sim2real.card.simulated import simulate  # noqa: E402
+from sling2sim2real.drawing.styles import INK  # noqa: E402
+from sling2sim2real.episode.episode import Episode  # noqa: E402
+from sling2sim2real.identification.results.theta import load_theta  # noqa: E402
+from sling2sim2real.settings import load  # noqa: E402
 
 PAGE = ROOT / "docs" / "hero.webp"
 OURS, PAPER = "least_squares", "sling2sim2real"

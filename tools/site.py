@@ -19,8 +19,8 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 import sling2sim2real  # noqa: E402
-from pipeline.base import errors  # noqa: E402
-from pipeline.base.errors import UserError  # noqa: E402
+from sling2sim2real.base import errors  # noqa: E402
+from sling2sim2real.base.errors import UserError  # noqa: E402
 
 SOURCE = ROOT / "build" / "site-source"
 LEFT_OUT = "tests/", ".dvc/", "dvc.lock"

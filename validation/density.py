@@ -10,18 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.base.machine import cores
-from pipeline.episode.episode import Episode
-from pipeline.identify.identify import search_and_fit
-from pipeline.identify.objective.box import SearchBox
-from pipeline.identify.objective.evaluate import Evaluator
-from pipeline.identify.objective.loss import TERMS, EpisodeLoss
-from pipeline.identify.posterior import identify as posterior
-from pipeline.identify.posterior.launches import Evidence, Observed
-from pipeline.params.identification import parameter_names
-from pipeline.simulator.launch import Launches, launch
-from pipeline.simulator.model import ClampedBand, LaunchSetup
-from pipeline.simulator.parameters import Parameters
+from sling2sim2real.base.machine import cores
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.identification.identify import search_and_fit
+from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.identification.objective.evaluate import Evaluator
+from sling2sim2real.identification.objective.loss import TERMS, EpisodeLoss
+from sling2sim2real.identification.posterior import identify as posterior
+from sling2sim2real.identification.posterior.launches import Evidence, Observed
+from sling2sim2real.settings.identification import parameter_names
+from sling2sim2real.simulator.launch import Launches, launch
+from sling2sim2real.simulator.model import ClampedBand, LaunchSetup
+from sling2sim2real.simulator.parameters import Parameters
 
 WORKERS = cores()
 

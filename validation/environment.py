@@ -6,8 +6,8 @@ import os
 import platform
 from importlib.metadata import version
 
-from pipeline.base.code import ROOT
-from pipeline.base.machine import commit, named, processor
+from sling2sim2real.base.code import ROOT
+from sling2sim2real.base.machine import commit, named, processor
 
 
 def environment(device: str, command: str = "") -> dict:

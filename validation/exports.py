@@ -12,15 +12,15 @@ import tempfile
 from importlib.metadata import version
 from pathlib import Path
 
-from pipeline.base import errors
-from pipeline.base.errors import UserError
-from pipeline.base.layout import Layout
-from pipeline.base.machine import devices
-from pipeline.episode.episode import Episode
-from pipeline.export.card import ASKED
-from pipeline.params import load
-from sling2sim2real.exporting import export
-from sling2sim2real.identification import Identification
+from sling2sim2real.api.exporting import export
+from sling2sim2real.api.identification import Identification
+from sling2sim2real.base import errors
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.base.machine import devices
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.exporting.card import ASKED
+from sling2sim2real.settings import load
 from validation.reports import write_report
 
 REPORT = "reports/validation/export-{}.json"

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import networkx
 
-from pipeline.base import errors
-from pipeline.base.code import CODE, ROOT, concern, imports
-from pipeline.base.errors import UserError
-from pipeline.base.files import write_text
-from pipeline.recording.checks.table import CHECKS
+from sling2sim2real.base import errors
+from sling2sim2real.base.code import CODE, ROOT, concern, imports
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.files import write_text
+from sling2sim2real.recording.checks.table import CHECKS
 from validation.benchmarks import times
 from validation.campaigns import field, landings
 from validation.campaigns.runner import read
@@ -25,8 +25,8 @@ from validation.reports import row
 
 CODE_BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)  # language, code
 WHOLE = "stages", "app", "sling2sim2real", "validation", "rig"  # each a box; the library is several
-LEFT_OUT = "pipeline/base", "pipeline/params"  # which all import
-DEVELOPERS = "app/developer.py"  # may import validation/
+LEFT_OUT = "sling2sim2real/base", "sling2sim2real/settings"  # which all import
+DEVELOPERS = "sling2sim2real/cli/developer.py"  # may import validation/
 
 
 def box(file: str) -> str:

@@ -17,12 +17,15 @@ from typing import TypeVar
 import psutil
 from ruamel.yaml import YAML
 
-from pipeline.base.code import ROOT
-from pipeline.params import Params, load
-from pipeline.params.identification import methods_by_step
+from sling2sim2real.base.code import ROOT
+from sling2sim2real.settings import Params, load
+from sling2sim2real.settings.identification import methods_by_step
 
-DEFAULTS = ROOT / "validation" / "params.yaml"  # as delivered, whatever a user sets in params.yaml
-CLI = ("-c", "from app.cli import main; main()")  # after `python`: this project's `sling`
+DEFAULTS = ROOT / "params.yaml"
+CLI = (
+    "-c",
+    "from sling2sim2real.cli.cli import main; main()",
+)  # after `python`: this project's `sling`
 SLING = (sys.executable, *CLI)
 PROMPT = 10.0  # s after which no process of a command that has ended may live
 MARK = "SLING_TEST_RUN"  # in the environment of every process of a MarkedRun
@@ -57,7 +60,7 @@ Value = TypeVar("Value")
 
 
 def copy_project(folder: Path) -> None:
-    """Copy into `folder` what Git would commit, with the parameters as they were delivered.
+    """Copy into `folder` what Git would commit.
 
     There is no dvc.lock: every stage is stale there.
     """
@@ -69,10 +72,9 @@ def copy_project(folder: Path) -> None:
         text=True,
     ).stdout
     for name in filter(None, listed.split("\0")):
-        if (ROOT / name).is_file() and name not in ("dvc.lock", "params.yaml"):
+        if (ROOT / name).is_file() and name != "dvc.lock":
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, folder / name, follow_symlinks=False)
-    shutil.copy(DEFAULTS, folder / "params.yaml")
 
 
 def set_params(folder: Path, values: Mapping[str, object]) -> None:

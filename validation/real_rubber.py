@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from pipeline.base import errors
-from pipeline.base.errors import UserError
-from pipeline.params.identification import LAWS
-from pipeline.simulator.rubber import RUBBER
+from sling2sim2real.base import errors
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.settings.identification import LAWS
+from sling2sim2real.simulator.rubber import RUBBER
 from validation.campaigns import runner
 from validation.real import data, figures, fits
 from validation.reports import plain, write_report

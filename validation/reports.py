@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.base.code import ROOT
-from pipeline.base.files import write_json
+from sling2sim2real.base.code import ROOT
+from sling2sim2real.base.files import write_json
 from validation.environment import environment
 
 

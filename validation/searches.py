@@ -1,4 +1,4 @@
-"""Plain variants of the searches in pipeline/identify/search, without what strengthens those.
+"""Plain variants of the searches in identification/search, without what strengthens those.
 
 Each is a class for `search: package.module:Class` of a method in params.yaml.
 """
@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.identify.optimizers.bo.bayes import Bayes
-from pipeline.identify.optimizers.cma.multistart import Multistart
-from pipeline.identify.optimizers.de.evolution import Evolution
-from pipeline.identify.search.loop import latin_hypercube
-from pipeline.identify.search.regions import Region, suppress
+from sling2sim2real.identification.optimizers.bo.bayes import Bayes
+from sling2sim2real.identification.optimizers.cma.multistart import Multistart
+from sling2sim2real.identification.optimizers.de.evolution import Evolution
+from sling2sim2real.identification.search.loop import latin_hypercube
+from sling2sim2real.identification.search.regions import Region, suppress
 
 
 class PlainStarts:

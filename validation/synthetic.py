@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.episode.episode import Episode
-from pipeline.episode.signal import average, lowpass, uniform
-from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.params import Params
-from pipeline.simulator.interaction import interact
-from pipeline.simulator.model import ClampedBand
-from pipeline.simulator.parameters import Parameters
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.episode.signal import average, lowpass, uniform
+from sling2sim2real.identification.objective.loss import EpisodeLoss
+from sling2sim2real.settings import Params
+from sling2sim2real.simulator.interaction import interact
+from sling2sim2real.simulator.model import ClampedBand
+from sling2sim2real.simulator.parameters import Parameters
 
 DRAW = 0.35  # m
 THETA = (2e5, 0.45, 2e-3, 0.5, 0.5)  # of the band that is recorded

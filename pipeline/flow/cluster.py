@@ -19,10 +19,10 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
-from pipeline.base import errors
-from pipeline.base.errors import UserError, one_line
-from pipeline.base.machine import cores, workers
 from pipeline.flow import dvc
+from sling2sim2real.base import errors
+from sling2sim2real.base.errors import UserError, one_line
+from sling2sim2real.base.machine import cores, workers
 
 
 @contextmanager

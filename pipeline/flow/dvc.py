@@ -19,9 +19,9 @@ import networkx
 import psutil
 from ruamel.yaml import YAML
 
-from pipeline.base.disk import with_disk
-from pipeline.base.errors import UserError, one_line
-from pipeline.base.machine import cores
+from sling2sim2real.base.disk import with_disk
+from sling2sim2real.base.errors import UserError, one_line
+from sling2sim2real.base.machine import cores
 
 DVC = (sys.executable, "-P", "-m", "dvc", "--wait-for-lock")
 GRACE = 15.0  # s that interrupted stages and DVC have to end

@@ -22,10 +22,10 @@ from prefect.client.schemas.objects import State
 from prefect.states import Completed, Failed
 from prefect.task_runners import ThreadPoolTaskRunner
 
-from pipeline.base.errors import UserError
-from pipeline.base.machine import cores
-from pipeline.base.progress import parse
 from pipeline.flow import cluster, dvc
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.machine import cores
+from sling2sim2real.base.progress import parse
 
 
 def run(

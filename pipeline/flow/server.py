@@ -11,7 +11,7 @@ from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
-from pipeline.base.errors import UserError
+from sling2sim2real.base.errors import UserError
 
 HOST, PORT = "127.0.0.1", 4200
 ASKING = 5.0  # s that a server has to answer

@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.launching.surface.aim import NEAR, landings_within, secants
-from pipeline.launching.surface.landing_map import LandingMap
+from sling2sim2real.launching.surface.aim import NEAR, landings_within, secants
+from sling2sim2real.launching.surface.landing_map import LandingMap
 
 Land = Callable[[np.ndarray], float]
 """Landing [m] of a launch from the draw (2,) without errors; NaN where there is none."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.params import Params
+from sling2sim2real.settings import Params
 
 
 def trial_numbers(params: Params) -> np.ndarray:

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.base.pool import Pool
-from pipeline.launching.surface.landing_map import LandingMap
-from pipeline.params import load
-from pipeline.params.lab import SetupParams
 from rig.oracle.aim import hit
 from rig.physics.launch import Trial, launch
+from sling2sim2real.base.pool import Pool
+from sling2sim2real.launching.surface.landing_map import LandingMap
+from sling2sim2real.settings import load
+from sling2sim2real.settings.lab import SetupParams
 
 
 @dataclass(frozen=True)

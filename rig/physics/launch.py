@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK, too_strong
-from pipeline.base.target import TARGET_AREA
 from rig.draw import sampled
 from rig.physics.compiled import compiled
 from rig.physics.integration import integrated
 from rig.physics.scene import ROD
 from rig.physics.string import GRAVITY, ElasticString
 from rig.physics.world import bent_at, pulled, string_of
+from sling2sim2real.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK, too_strong
+from sling2sim2real.base.target import TARGET_AREA
 
 if TYPE_CHECKING:
-    from pipeline.params import Params
+    from sling2sim2real.settings import Params
 
 PATIENCE = 0.5  # s within which the projectile leaves the pouch, if it ever does
 FLIGHT = 20.0  # s, more than any flight takes

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from pipeline.base.errors import UserError
 from rig.physics.compiled import compiled
+from sling2sim2real.base.errors import UserError
 
 if TYPE_CHECKING:
-    from pipeline.params.lab import Dip
+    from sling2sim2real.settings.lab import Dip
 
 # Seconds from the start of a recording without dips, which delay what comes after them.
 START = 0.4  # the hand leaves its place

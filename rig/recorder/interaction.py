@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.base.errors import UserError
 from rig.physics.motion import GRASP, HandMotion
 from rig.physics.servo import Servo
 from rig.physics.string import ElasticString
 from rig.physics.world import bent_at
+from sling2sim2real.base.errors import UserError
 
 if TYPE_CHECKING:
-    from pipeline.params import Params
+    from sling2sim2real.settings import Params
 
 
 @dataclass(frozen=True)

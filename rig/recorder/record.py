@@ -11,7 +11,6 @@ import numpy as np
 from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
-from pipeline.base.files import replacing
 from rig.draw import sampled
 from rig.physics.motion import HandMotion
 from rig.physics.robot import SENSOR_LEVER, Robot
@@ -23,10 +22,11 @@ from rig.recorder.camera import VirtualCamera
 from rig.recorder.interaction import Interaction, hang, pull_and_release
 from rig.recorder.mcap_writer import BagWriter
 from rig.recorder.sensors import wrench
+from sling2sim2real.base.files import replacing
 
 if TYPE_CHECKING:
-    from pipeline.params import Params
-    from pipeline.params.virtual_rig import RigClock
+    from sling2sim2real.settings import Params
+    from sling2sim2real.settings.virtual_rig import RigClock
 
 EPOCH = 1_760_000_000_000_000_000  # ns, when the recording starts
 SENSOR_RATE, GRIPPER_RATE = 1000, 50  # Hz

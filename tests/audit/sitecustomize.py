@@ -15,7 +15,7 @@ from pathlib import Path
 
 SHORT = {  # by stage and module
     "report": {
-        "pipeline.report.drawing.styles": {"THEME": {}}
+        "sling2sim2real.drawing.styles": {"THEME": {}}
     },  # a layout that is solved draws all twice
 }
 read: set[str] = set()
@@ -70,7 +70,7 @@ def noted(value: object, path: str) -> object:
 def note(path: str) -> None:
     read.add(path)
     if path.startswith("methods."):  # what a method leaves out is as the defaults say
-        from pipeline.params.identification import MethodDefaults
+        from sling2sim2real.settings.identification import MethodDefaults
 
         read.update(
             f"method_defaults.{key}"
@@ -90,7 +90,7 @@ def shorten(step: str) -> None:
 def install(stage: str) -> None:
     os.environ["AUDITED"] = stage
     sys.path.insert(0, os.getcwd())
-    from pipeline import params
+    from sling2sim2real import settings as params
 
     load = params.load
     params.load = lambda *path: Section(load(*path))

@@ -4,8 +4,8 @@ import errno
 
 import pytest
 
-from pipeline.base import errors
-from pipeline.base.errors import UserError, one_line
+from sling2sim2real.base import errors
+from sling2sim2real.base.errors import UserError, one_line
 
 EVIL = "x\x1b[2J\u202e<b>é\n"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.base.files import replacing, replacing_folder, write_text
+from sling2sim2real.base.files import replacing, replacing_folder, write_text
 from tests.project import python
 
 
@@ -83,8 +83,8 @@ def test_a_full_disk_is_said_in_one_line(place: str, tmp_path: Path) -> None:
     code = f"""
 import resource
 from pathlib import Path
-from pipeline.base import errors
-from pipeline.base.files import replacing, replacing_folder
+from sling2sim2real.base import errors
+from sling2sim2real.base.files import replacing, replacing_folder
 resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))
 def log(path):
     path.write_bytes(bytes(501))

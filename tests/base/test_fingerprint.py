@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from pipeline.base.fingerprint import fingerprint
+from sling2sim2real.base.fingerprint import fingerprint
 
 
 def test_it_covers_contents_and_sources(tmp_path: Path) -> None:

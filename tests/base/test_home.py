@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.base import home
-from pipeline.base.errors import UserError
+from sling2sim2real.base import home
+from sling2sim2real.base.errors import UserError
 
 
 @pytest.fixture

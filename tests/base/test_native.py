@@ -8,7 +8,7 @@ STARTED_TWICE = """
 import time
 from concurrent.futures import ThreadPoolExecutor
 import warp._src.context as context
-from pipeline.identify.objective.kernel import chamfer_kernel
+from sling2sim2real.identification.objective.kernel import chamfer_kernel
 
 starts, runtime = [], context.Runtime
 
@@ -24,7 +24,7 @@ print(len(starts))
 """
 SOMETHING_ELSE = """
 import os
-from pipeline.base import native
+from sling2sim2real.base import native
 
 start = native.wp.init
 native.wp.init = lambda: (start(), os.write(2, b"something else\\n"))
@@ -33,13 +33,13 @@ native.start()
 SIMULATED = """
 import hashlib, sys
 import numpy as np
-from pipeline.base.native import wp
-from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.params import load
-from pipeline.simulator.interaction import interact
-from pipeline.simulator.launch import launch
-from pipeline.simulator.model import LaunchSetup
-from pipeline.simulator.parameters import Parameters
+from sling2sim2real.base.native import wp
+from sling2sim2real.identification.objective.loss import EpisodeLoss
+from sling2sim2real.settings import load
+from sling2sim2real.simulator.interaction import interact
+from sling2sim2real.simulator.launch import launch
+from sling2sim2real.simulator.model import LaunchSetup
+from sling2sim2real.simulator.parameters import Parameters
 from validation.projects import DEFAULTS
 from validation.synthetic import THETA, recorded_yardstick
 

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.base.pool import Pool
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.pool import Pool
 from tests.project import python
 from validation.projects import MarkedRun, wait
 
 CODE = """\
 import os, sys, time
 from pathlib import Path
-from pipeline.base import errors
-from pipeline.base.pool import Pool
+from sling2sim2real.base import errors
+from sling2sim2real.base.pool import Pool
 
 def busy(number):
     Path(f"worker-{number}").touch()
@@ -58,5 +58,5 @@ def test_a_killed_worker_is_one_line() -> None:
 
 
 def test_a_pool_is_as_wide_as_the_environment_says() -> None:
-    summary = "from pipeline.base.pool import Pool; print(Pool()._max_workers)"
+    summary = "from sling2sim2real.base.pool import Pool; print(Pool()._max_workers)"
     assert python("-c", summary, SLING_WORKERS="3").stdout == "3\n"

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.base import progress
-from pipeline.base.progress import Progress, Step, parse
+from sling2sim2real.base import progress
+from sling2sim2real.base.progress import Progress, Step, parse
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import pytest
 from jinja2 import UndefinedError
 
-from pipeline.base.template import filled
+from sling2sim2real.base.template import filled
 
 
 def test_a_missing_value_is_refused(tmp_path) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.episode.episode import Episode
-from tests.identify.search import toy
+from sling2sim2real.episode.episode import Episode
+from tests.identification.search import toy
 
 GRASP, LIFTED, HANGING, TAUT = 0.5, 1.2, 0.195, 0.22  # s, s, m, m
 MONOTONE = ((1.2, 0.0), (4.2, 0.4), (6.2, 0.4))

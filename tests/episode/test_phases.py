@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from pipeline.base.errors import UserError
-from pipeline.episode.phases import (
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.episode.phases import (
     NO_UNLOADING,
     InteractionPhase,
     phases,
@@ -19,7 +19,7 @@ from pipeline.episode.phases import (
     unseen,
 )
 from tests.episode import led
-from tests.identify.search import toy
+from tests.identification.search import toy
 
 RELEASE = 2.4
 OFTEN = [(0.0, 0.0), (2e-4, 0.0), (2e-4, 0.002), (5e-4, 0.0)]  # noise and wander of hands

@@ -4,9 +4,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.episode.planned import leg_time, legs_of, planned_pull
-from pipeline.params import load
-from pipeline.params.lab import Dip
+from sling2sim2real.episode.planned import leg_time, legs_of, planned_pull
+from sling2sim2real.settings import load
+from sling2sim2real.settings.lab import Dip
 from tests.project import DEFAULTS
 
 EPISODE = load(DEFAULTS).episode.model_copy(update={"samples": 900})  # 10 ms each

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.episode.pull import EDGES, PARTS, launch_history
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.episode.pull import EDGES, PARTS, launch_history
 from tests.episode import led
 
 

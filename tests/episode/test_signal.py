@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from pipeline.episode.signal import (
+from sling2sim2real.episode.signal import (
     as_recorded,
     average,
     cutoff_hz,

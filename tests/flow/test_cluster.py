@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.base.errors import UserError
 from pipeline.flow import cluster
+from sling2sim2real.base.errors import UserError
 from tests.flow.toy import MEET, Toy, stage, wait_until
 
 pytestmark = pytest.mark.slow

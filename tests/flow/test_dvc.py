@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.base.errors import UserError
 from pipeline.flow.dvc import StageFailed, cause, named, repro, stale
+from sling2sim2real.base.errors import UserError
 from tests.flow.toy import Toy, stage
 
 STAGES = ("theta@band1-paper", "ablation_theta@band1-de", "report")

@@ -2,7 +2,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipeline.launching.surface.landing_map import LandingMap
+from sling2sim2real.launching.surface.landing_map import LandingMap
 from tests import once
 from tests.policy import toy
 
@@ -36,7 +36,7 @@ def toy_map() -> LandingMap:
 
 @pytest.fixture(scope="session")
 def trained(toy_map, tmp_path_factory: pytest.TempPathFactory):
-    from pipeline.policy.train import train
+    from sling2sim2real.policy.train import train
 
     return once.value(tmp_path_factory, "trained", lambda _: train(toy_map.surface, SETTINGS))
 
@@ -44,7 +44,7 @@ def trained(toy_map, tmp_path_factory: pytest.TempPathFactory):
 @pytest.fixture(scope="session")
 def seeing(toy_map, tmp_path_factory: pytest.TempPathFactory):
     """A policy that sees the projectile too."""
-    from pipeline.policy.train import train
+    from sling2sim2real.policy.train import train
 
     return once.value(
         tmp_path_factory,

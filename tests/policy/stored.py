@@ -6,9 +6,9 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from pipeline.launching.surface.landing_map import LandingMap, validation
-from pipeline.policy.export import write_onnx
-from pipeline.policy.train import Policy
+from sling2sim2real.launching.surface.landing_map import LandingMap, validation
+from sling2sim2real.policy.export import write_onnx
+from sling2sim2real.policy.train import Policy
 from tests.policy import toy
 
 

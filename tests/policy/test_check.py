@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.launching.surface.response_surface import TOO_MUCH_FORCE
-from pipeline.policy.check import CONVERGED, PolicyCheck, check, figures, verdict
+from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE
+from sling2sim2real.policy.check import CONVERGED, PolicyCheck, check, figures, verdict
 from tests.policy import toy
 
 

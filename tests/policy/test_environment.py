@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.launching.surface.response_surface import TOO_MUCH_FORCE, ResponseSurface
-from pipeline.policy.environment import SlingshotEnv, projectile_start
+from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE, ResponseSurface
+from sling2sim2real.policy.environment import SlingshotEnv, projectile_start
 from tests.policy import toy
 
 TARGETS = (1.425, 2.425)

@@ -10,12 +10,12 @@ import onnxruntime
 import pytest
 import torch
 
-from pipeline.base.files import write_json
-from pipeline.launching.surface.stored import Stored
-from pipeline.params import load
-from pipeline.policy.check import PolicyCheck, figures
-from pipeline.policy.export import USED, card, write_onnx
-from pipeline.simulator.parameters import THETA
+from sling2sim2real.base.files import write_json
+from sling2sim2real.launching.surface.stored import Stored
+from sling2sim2real.policy.check import PolicyCheck, figures
+from sling2sim2real.policy.export import USED, card, write_onnx
+from sling2sim2real.settings import load
+from sling2sim2real.simulator.parameters import THETA
 from tests.golden import expect_golden
 from tests.policy import toy
 from tests.project import DEFAULTS, ROOT, python
@@ -113,7 +113,7 @@ def test_equal_networks_give_equal_bytes(trained, folder, tmp_path) -> None:
     code = """
 import torch
 from pathlib import Path
-from pipeline.policy.export import write_onnx
+from sling2sim2real.policy.export import write_onnx
 write_onnx(torch.load("../network.pickle", weights_only=False), Path("policy.onnx"))
 """
     for seed in "12":

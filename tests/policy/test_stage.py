@@ -9,9 +9,9 @@ import pyarrow.parquet as pq
 import pytest
 from ruamel.yaml import YAML
 
-from pipeline.base.files import write_json
-from pipeline.launching.surface.stored import Stored
-from pipeline.simulator.parameters import THETA
+from sling2sim2real.base.files import write_json
+from sling2sim2real.launching.surface.stored import Stored
+from sling2sim2real.simulator.parameters import THETA
 from stages import policy
 from tests.policy import toy
 from tests.project import DEFAULTS

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.base.progress import Progress, parse
-from pipeline.launching.surface.landing_map import LandingMap
-from pipeline.launching.surface.response_surface import TOO_MUCH_FORCE
-from pipeline.launching.surface.simulated import SimulatedLandings
-from pipeline.policy.train import Trained, train
+from sling2sim2real.base.progress import Progress, parse
+from sling2sim2real.launching.surface.landing_map import LandingMap
+from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE
+from sling2sim2real.launching.surface.simulated import SimulatedLandings
+from sling2sim2real.policy.train import Trained, train
 from tests.policy import toy
 
 CHANGES = {

@@ -7,12 +7,12 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.episode.episode import Episode
-from pipeline.recording.build import build_episodes, episode_of, process, process_pull
-from pipeline.recording.input.reader import read_recording
-from pipeline.recording.pulls import Pull
-from pipeline.recording.signals import signals_of
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.recording.build import build_episodes, episode_of, process, process_pull
+from sling2sim2real.recording.input.reader import read_recording
+from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.recording.signals import signals_of
 from tests.project import with_
 from validation.recordings.bag import EYE, Truth, blind_bag, edit, scores
 

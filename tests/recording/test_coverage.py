@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.recording.checks.pictures import of_coverage
-from pipeline.recording.coverage import by_phase, over_time, share_covered, share_off_plane
+from sling2sim2real.recording.checks.pictures import of_coverage
+from sling2sim2real.recording.coverage import by_phase, over_time, share_covered, share_off_plane
 
 
 def test_points_of_the_arm_in_the_hanging_band_are_said(checked, params) -> None:

@@ -8,14 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.recording import delays
-from pipeline.recording.camera_delay import camera_delay
-from pipeline.recording.delays import Estimate, correct_delays
-from pipeline.recording.geometry import geometry_of
-from pipeline.recording.input.reader import read_recording
-from pipeline.recording.pulls import Pull
-from pipeline.recording.release_pictures import ReleasePictures
-from pipeline.recording.tool_inertia import ToolInertia, estimate_tool_inertia
+from sling2sim2real.recording import delays
+from sling2sim2real.recording.camera_delay import camera_delay
+from sling2sim2real.recording.delays import Estimate, correct_delays
+from sling2sim2real.recording.geometry import geometry_of
+from sling2sim2real.recording.input.reader import read_recording
+from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.recording.release_pictures import ReleasePictures
+from sling2sim2real.recording.tool_inertia import ToolInertia, estimate_tool_inertia
 from tests.project import with_
 from tests.recording.played import Played
 from validation.recordings.bag import Truth
@@ -107,7 +107,7 @@ def test_wrong_extrinsics_are_no_delay(looked_at) -> None:
     """A camera that is 3 mm and half a degree elsewhere."""
     from scipy.spatial.transform import Rotation
 
-    from pipeline.recording.input.frames import Transform
+    from sling2sim2real.recording.input.frames import Transform
 
     recording, geometry = looked_at
     off = Transform(Rotation.from_rotvec([0.006, -0.004, 0.005]), np.array([0.002, 0.002, -0.001]))

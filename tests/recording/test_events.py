@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.recording.grasp import find_grasp
-from pipeline.recording.release import find_release, find_releases
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.grasp import find_grasp
+from sling2sim2real.recording.release import find_release, find_releases
 
 DIRECTION = np.array([0.3, -0.8, 0.52])
 

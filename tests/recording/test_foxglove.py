@@ -6,10 +6,10 @@ import foxglove
 import numpy as np
 import pytest
 
-from pipeline.episode.episode import Episode
-from pipeline.recording.build import build_episodes
-from pipeline.recording.input import images
-from pipeline.recording.input.reader import Recording, read_recording
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.recording.build import build_episodes
+from sling2sim2real.recording.input import images
+from sling2sim2real.recording.input.reader import Recording, read_recording
 from validation.recordings.foxglove_bag import translate
 
 

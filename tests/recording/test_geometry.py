@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pipeline.base.errors import UserError
-from pipeline.recording.geometry import geometry_of
-from pipeline.recording.input.frames import Transform, TransformTree
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.geometry import geometry_of
+from sling2sim2real.recording.input.frames import Transform, TransformTree
 
 SETUP = SimpleNamespace(base_to_fork=None, camera_to_fork=None, tip_link=None, fork_width=0.275)
 TURN = Rotation.from_euler("z", 30, degrees=True)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.base.errors import UserError
-from pipeline.recording.motion import Motion
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.motion import Motion
 
 CENTER = np.zeros(3)
 RELEASE, SWAY, KICK = 1.5037, 2 * np.pi * 8, 2.4  # s, rad/s and m/s^2 of an arm that is let go

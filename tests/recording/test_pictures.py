@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.recording.build import process
-from pipeline.recording.checks import pictures
-from pipeline.recording.input.images import depth
-from pipeline.recording.input.readings import Picture
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.build import process
+from sling2sim2real.recording.checks import pictures
+from sling2sim2real.recording.input.images import depth
+from sling2sim2real.recording.input.readings import Picture
 from validation.recordings.bag import Lens, write_bag
 from validation.recordings.small import TRUTH, small_params
 
@@ -90,8 +90,8 @@ def test_depth_of_another_unit_or_order(
     tmp_path, monkeypatch, factor, kind, swapped, output
 ) -> None:
     """What a driver would send is put in the place of what the recording holds."""
-    from pipeline.recording import build
-    from pipeline.recording.input.reader import Recording
+    from sling2sim2real.recording import build
+    from sling2sim2real.recording.input.reader import Recording
 
     read = build.read_recording
 

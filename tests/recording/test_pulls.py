@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.recording import pulls
-from pipeline.recording.build import build_episodes, process_pulls
-from pipeline.recording.input import reader
-from pipeline.recording.input.reader import read_recording
-from pipeline.recording.motion import Motion
-from pipeline.recording.pulls import Pull, pulls_of
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording import pulls
+from sling2sim2real.recording.build import build_episodes, process_pulls
+from sling2sim2real.recording.input import reader
+from sling2sim2real.recording.input.reader import read_recording
+from sling2sim2real.recording.motion import Motion
+from sling2sim2real.recording.pulls import Pull, pulls_of
 from tests.project import with_
 from tests.recording.conftest import written
 from tests.recording.parts import joined

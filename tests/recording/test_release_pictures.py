@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.recording.checks.times import of_release
-from pipeline.recording.delays import correct_delays
-from pipeline.recording.input.reader import read_recording
-from pipeline.recording.pulls import Pull
-from pipeline.recording.release_pictures import ReleasePictures, release_pictures
+from sling2sim2real.recording.checks.times import of_release
+from sling2sim2real.recording.delays import correct_delays
+from sling2sim2real.recording.input.reader import read_recording
+from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.recording.release_pictures import ReleasePictures, release_pictures
 
 SOUND = ReleasePictures(-0.03, 0.02, -0.015, 0.02, (), (), (0.0, 0.0, 0.0))
 

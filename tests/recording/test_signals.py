@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.base.errors import UserError
-from pipeline.recording.pulls import Pull
-from pipeline.recording.signals import ToolFacts, signals_of
-from pipeline.recording.tool_inertia import estimate_tool_inertia
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.recording.signals import ToolFacts, signals_of
+from sling2sim2real.recording.tool_inertia import estimate_tool_inertia
 from tests.project import with_
 from tests.recording.played import GRAVITY, Played, stream
 from validation.recordings.bag import HAND, SENSOR, START, Truth

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.recording.start_back import start_back
+from sling2sim2real.recording.start_back import start_back
 
 RELEASE = 3.0
 TIME = np.arange(0.0, 4.0, 0.002)

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.base.layout import Layout
-from pipeline.params import Params
-from pipeline.recording import stored
-from pipeline.recording.build import build_episodes
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.recording import stored
+from sling2sim2real.recording.build import build_episodes
+from sling2sim2real.settings import Params
 from tests.project import contents, with_
 
 
@@ -27,14 +27,14 @@ def never(*_):
 def test_what_is_kept_is_what_would_be_made(layout, seen, params, monkeypatch) -> None:
     (made,), _ = build_episodes(seen[0], "band1", params)
     made.save(layout.root / "made")
-    monkeypatch.setattr("pipeline.recording.build.build_episodes", never)
+    monkeypatch.setattr("sling2sim2real.recording.build.build_episodes", never)
     (episode,), refused = stored.load_or_build(seen[0], "band1", params, layout)
     episode.save(layout.root / "found")
     assert contents(layout.root / "found") == contents(layout.root / "made") and not refused
 
 
 def test_anything_changed_makes_it_again(layout, seen, params, monkeypatch) -> None:
-    monkeypatch.setattr("pipeline.recording.build.build_episodes", lambda *_: "made")
+    monkeypatch.setattr("sling2sim2real.recording.build.build_episodes", lambda *_: "made")
 
     def requested(path: Path = seen[0], band: str = "band1", params: Params = params):
         return stored.load_or_build(path, band, params, layout)

@@ -8,10 +8,10 @@ import pytest
 from scipy.integrate import trapezoid
 from scipy.spatial.transform import Rotation
 
-from pipeline.recording.build import process
-from pipeline.recording.checks.camera import camera_to_fork
-from pipeline.recording.tips import measure_tips
-from pipeline.recording.view import Scene
+from sling2sim2real.recording.build import process
+from sling2sim2real.recording.checks.camera import camera_to_fork
+from sling2sim2real.recording.tips import measure_tips
+from sling2sim2real.recording.view import Scene
 from tests.project import with_
 from validation.recordings.bag import BASE, EYE, TIPS, edit, write_bag
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.recording.zero import drift_of, zeroed
+from sling2sim2real.recording.zero import drift_of, zeroed
 
 T = np.arange(10_000) / 1000
 BIAS = np.array([3.0, -4.0, 6.0])

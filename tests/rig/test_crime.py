@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.episode.signal import cutoff_hz
-from pipeline.identify.identify import evaluations_of
-from pipeline.identify.objective.box import SearchBox
-from pipeline.identify.objective.evaluate import Evaluator
-from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.recording.build import build_episodes
-from pipeline.simulator.model import ClampedBand
-from pipeline.simulator.parameters import Parameters
 from rig.physics.world import string_of
 from rig.recorder.record import EPOCH
+from sling2sim2real.episode.signal import cutoff_hz
+from sling2sim2real.identification.identify import evaluations_of
+from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.identification.objective.evaluate import Evaluator
+from sling2sim2real.identification.objective.loss import EpisodeLoss
+from sling2sim2real.recording.build import build_episodes
+from sling2sim2real.simulator.model import ClampedBand
+from sling2sim2real.simulator.parameters import Parameters
 from tests.project import with_
 from validation.projects import ROUGH
 from validation.synthetic import own_law_episode, visible

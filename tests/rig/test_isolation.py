@@ -6,10 +6,10 @@ import pytest
 from mcap.reader import make_reader
 from ruamel.yaml import YAML
 
-from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.recording.build import build_episodes
-from pipeline.simulator.model import ClampedBand
 from rig.recorder.interaction import Interaction
+from sling2sim2real.identification.objective.loss import EpisodeLoss
+from sling2sim2real.recording.build import build_episodes
+from sling2sim2real.simulator.model import ClampedBand
 from tests.project import ROOT
 
 STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK
-from pipeline.params import Params
-from pipeline.simulator import ClampedBand, LaunchSetup, launch
-from pipeline.simulator.parameters import Parameters
 from rig.physics.launch import launch as on_the_rig
+from sling2sim2real.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK
+from sling2sim2real.settings import Params
+from sling2sim2real.simulator import ClampedBand, LaunchSetup, launch
+from sling2sim2real.simulator.parameters import Parameters
 from tests.project import with_
 
 FIVE = [1.86e5, 0.47, 2e-3, 0.5, 1.0]  # holds a draw of 0.43 m as the rig's band1 does

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipeline.recording.build import process
+from sling2sim2real.recording.build import process
 
 
 @pytest.mark.slow

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from pipeline.simulator.initial import sections_of
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.records import Grip
-from pipeline.simulator.rubber import NEO_HOOKEAN
-from pipeline.simulator.schedule import Schedule, relaxation
-from pipeline.simulator.solver import Options, Slings, run
+from sling2sim2real.simulator.initial import sections_of
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.records import Grip
+from sling2sim2real.simulator.rubber import NEO_HOOKEAN
+from sling2sim2real.simulator.schedule import Schedule, relaxation
+from sling2sim2real.simulator.solver import Options, Slings, run
 
 BASE = np.array([2e5, 0.42, 3e-3, 0.6, 0.6])
 BOX = np.array([[3e4, 1e7], [0.30, 0.49], [1e-4, 5e-2], [0.05, 1.0], [0.0, 1.0]])

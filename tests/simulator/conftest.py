@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.base.minimum_jerk import minimum_jerk
-from pipeline.episode.episode import Episode
-from pipeline.simulator import ClampedBand, LaunchSetup
+from sling2sim2real.base.minimum_jerk import minimum_jerk
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.simulator import ClampedBand, LaunchSetup
 
 
 @pytest.fixture(scope="session")

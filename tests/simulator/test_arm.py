@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.simulator import launch
-from pipeline.simulator.initial import drawn_guess
-from pipeline.simulator.launch import memory_of_pull, schedule_of
-from pipeline.simulator.model import LaunchHistory
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
-from pipeline.simulator.schedule import Schedule
-from pipeline.simulator.solver import Options, Slings, run
+from sling2sim2real.simulator import launch
+from sling2sim2real.simulator.initial import drawn_guess
+from sling2sim2real.simulator.launch import memory_of_pull, schedule_of
+from sling2sim2real.simulator.model import LaunchHistory
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.rubber import NEO_HOOKEAN, RUBBER
+from sling2sim2real.simulator.schedule import Schedule
+from sling2sim2real.simulator.solver import Options, Slings, run
 from tests.simulator.bands import DRAW, THETA, neo, random_draws, random_thetas
 
 ARM = 12000.0

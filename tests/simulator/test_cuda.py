@@ -6,14 +6,14 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from pipeline.base.machine import gpus
-from pipeline.identify.objective.box import SearchBox
-from pipeline.identify.objective.evaluate import Evaluator
-from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.params import load
-from pipeline.simulator import interact, launch
-from pipeline.simulator.model import LaunchHistory
-from pipeline.simulator.parameters import Parameters
+from sling2sim2real.base.machine import gpus
+from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.identification.objective.evaluate import Evaluator
+from sling2sim2real.identification.objective.loss import EpisodeLoss
+from sling2sim2real.settings import load
+from sling2sim2real.simulator import interact, launch
+from sling2sim2real.simulator.model import LaunchHistory
+from sling2sim2real.simulator.parameters import Parameters
 from tests.project import DEFAULTS
 from tests.simulator.bands import neo, random_draws, random_thetas
 
@@ -90,7 +90,7 @@ def test_gpus_share_a_batch_and_change_nothing(
         for name, values in first.terms.items():
             np.testing.assert_array_equal(other.terms[name], values)
 
-    monkeypatch.setattr(import_module("pipeline.simulator.launch"), "SHARE", 1)
+    monkeypatch.setattr(import_module("sling2sim2real.simulator.launch"), "SHARE", 1)
     thetas = space.parameters(space.to_physical(unit))
     first, *others = (
         launch(sling, launch_setup, thetas, [-0.4, -0.2], device=team) for team in teams

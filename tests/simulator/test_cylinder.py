@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from pipeline.simulator.cylinder import cylinder, section, volumes
+from sling2sim2real.simulator.cylinder import cylinder, section, volumes
 
 
 def test_mesh_fills_the_round_band_and_neighbours_share_faces():

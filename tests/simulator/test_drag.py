@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.simulator.interaction import interact
-from pipeline.simulator.launch import launch
-from pipeline.simulator.model import GRAVITY, ClampedBand
-from pipeline.simulator.records import Grip
-from pipeline.simulator.schedule import steps
+from sling2sim2real.simulator.interaction import interact
+from sling2sim2real.simulator.launch import launch
+from sling2sim2real.simulator.model import GRAVITY, ClampedBand
+from sling2sim2real.simulator.records import Grip
+from sling2sim2real.simulator.schedule import steps
 from tests.simulator.bands import along_x, neo, stepped
 
 THETA = [3e5, 0.45, 2e-3, 0.5, 1.0]

@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from pipeline.base.layout import Layout
-from pipeline.identify.results.mounting import load_sling
-from pipeline.identify.results.theta import load_samples
-from pipeline.params import load
-from pipeline.simulator.parameters import Parameters
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.identification.results.mounting import load_sling
+from sling2sim2real.identification.results.theta import load_samples
+from sling2sim2real.settings import load
+from sling2sim2real.simulator.parameters import Parameters
 from tests.edited import outcomes
 from tests.project import DEFAULTS
-from tests.report.run.conftest import posterior
+from tests.report.conftest import posterior
 
 
 def test_the_calibration_of_clamps(tmp_path: Path) -> None:

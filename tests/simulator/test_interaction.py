@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.simulator import THETA, interact
+from sling2sim2real.simulator import THETA, interact
 from tests.simulator.bands import BASE, BOX, neo, random_thetas
 
 

@@ -9,9 +9,9 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from pipeline.simulator import launch, solver
-from pipeline.simulator.launch import ballistic_landing
-from pipeline.simulator.model import GRAVITY
+from sling2sim2real.simulator import launch, solver
+from sling2sim2real.simulator.launch import ballistic_landing
+from sling2sim2real.simulator.model import GRAVITY
 from tests.simulator.bands import DRAW, THETA, neo
 
 
@@ -43,7 +43,7 @@ def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch, launch_se
         requested.append((options.device, len(slings)))
         return solver.run(sling, schedule, slings, options=replace(options, device="cpu"))
 
-    module = import_module("pipeline.simulator.launch")
+    module = import_module("sling2sim2real.simulator.launch")
     monkeypatch.setattr(module, "run", run)
     for share, expected in (
         (5, {("a", 9)}),

@@ -11,15 +11,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.simulator.initial import drawn_guess
-from pipeline.simulator.model import ClampedBand
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.records import Grip
-from pipeline.simulator.rubber import RUBBER
 from rig.physics.elasticity import law_of
 from rig.physics.rubber import Rubber
 from rig.physics.string import ElasticString
 from rig.physics.world import bent_at
+from sling2sim2real.simulator.initial import drawn_guess
+from sling2sim2real.simulator.model import ClampedBand
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.records import Grip
+from sling2sim2real.simulator.rubber import RUBBER
 from validation.simulator.experiment import band_of, launched, move, settling
 from validation.simulator.finding import Bench
 

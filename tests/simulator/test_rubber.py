@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.simulator import interact, launch
-from pipeline.simulator.launch import memory_of_pull
-from pipeline.simulator.model import LaunchHistory
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.rubber import RUBBER, TIMES, flowed, overstress, update
+from sling2sim2real.simulator import interact, launch
+from sling2sim2real.simulator.launch import memory_of_pull
+from sling2sim2real.simulator.model import LaunchHistory
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.rubber import RUBBER, TIMES, flowed, overstress, update
 from tests.simulator.bands import neo
 
 THETA = np.array([3e5, 0.45, 2e-3, 0.5, 0.7])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.simulator import launch
-from pipeline.simulator.initial import hanging_guess
-from pipeline.simulator.model import GRAVITY
+from sling2sim2real.simulator import launch
+from sling2sim2real.simulator.initial import hanging_guess
+from sling2sim2real.simulator.model import GRAVITY
 from tests.simulator.bands import at_rest, neo
 from validation.simulator.reference import ReferenceRod
 

@@ -6,11 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.identify.results.theta import content_of, load_samples, load_theta, parameters_of
-from pipeline.params.identification import LAWS
-from pipeline.simulator.model import LaunchHistory
-from pipeline.simulator.parameters import THETA, Parameters
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.identification.results.theta import (
+    content_of,
+    load_samples,
+    load_theta,
+    parameters_of,
+)
+from sling2sim2real.settings.identification import LAWS
+from sling2sim2real.simulator.model import LaunchHistory
+from sling2sim2real.simulator.parameters import THETA, Parameters
 
 SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.base.layout import Layout, NotMade
-from pipeline.identify.objective.session import load_episodes
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.layout import Layout, NotMade
+from sling2sim2real.identification.objective.session import load_episodes
 from stages import episode
 from tests.project import with_
 from tests.recording.conftest import blind, params, seen

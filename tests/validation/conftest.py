@@ -1,7 +1,7 @@
 import pytest
 
-from pipeline.params import Params
-from pipeline.simulator.model import ClampedBand
+from sling2sim2real.settings import Params
+from sling2sim2real.simulator.model import ClampedBand
 from validation.simulator.finding import Bench
 
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from pipeline.base.errors import UserError
+from sling2sim2real.base.errors import UserError
 from validation import exports, reports
 
 ROW = {"met": True, "engine": "an engine", "matched": [], "files": {}}

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipeline.base.errors import UserError
+from sling2sim2real.base.errors import UserError
 from tests.project import ROOT
 from validation import pages
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.base.errors import UserError
+from sling2sim2real.base.errors import UserError
 from validation.campaigns.runner import (
     THREADS,
     ResultLines,

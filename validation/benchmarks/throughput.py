@@ -12,19 +12,19 @@ from functools import partial
 import numpy as np
 from scipy.stats import qmc
 
-from pipeline.base.machine import named
-from pipeline.identify.objective.box import SearchBox
-from pipeline.identify.objective.evaluate import Evaluator
-from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.params import Params
-from pipeline.simulator.interaction import Rollouts, interact, schedule_of
-from pipeline.simulator.launch import Launches, launch
-from pipeline.simulator.model import LaunchSetup
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.records import Grip
-from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
-from pipeline.simulator.schedule import RELAX_STEPS
-from pipeline.simulator.solver import Options, memory
+from sling2sim2real.base.machine import named
+from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.identification.objective.evaluate import Evaluator
+from sling2sim2real.identification.objective.loss import EpisodeLoss
+from sling2sim2real.settings import Params
+from sling2sim2real.simulator.interaction import Rollouts, interact, schedule_of
+from sling2sim2real.simulator.launch import Launches, launch
+from sling2sim2real.simulator.model import LaunchSetup
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.records import Grip
+from sling2sim2real.simulator.rubber import NEO_HOOKEAN, RUBBER
+from sling2sim2real.simulator.schedule import RELAX_STEPS
+from sling2sim2real.simulator.solver import Options, memory
 from validation.benchmarks.timing import seconds, shared
 from validation.synthetic import DRAW, recorded_yardstick
 
@@ -120,8 +120,8 @@ def steps_of(schedule) -> dict[str, int]:
 def first_start(device: str) -> dict[str, float]:
     """Seconds that a new process needs for one launch: with an empty kernel cache, and again."""
     code = (
-        "from pipeline.params import load; p = load();"
-        "from pipeline.simulator import ClampedBand, LaunchSetup, Parameters, launch;"
+        "from sling2sim2real.settings import load; p = load();"
+        "from sling2sim2real.simulator import ClampedBand, LaunchSetup, Parameters, launch;"
         "b = next(iter(p.bands.values())); lab = p.setup, p.sling;"
         "launch(ClampedBand.of(b, *lab), LaunchSetup.of(*lab),"
         "Parameters.of('neo_hookean', [3e5, 0.45, 2e-3, 0.5, 1.0]),"

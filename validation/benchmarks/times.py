@@ -19,10 +19,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.base import errors
-from pipeline.base.code import ROOT
-from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
+from sling2sim2real.base import errors
+from sling2sim2real.base.code import ROOT
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.files import write_json
 from validation.benchmarks.timing import disk, measured
 from validation.reports import row, write_report
 

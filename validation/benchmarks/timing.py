@@ -15,7 +15,7 @@ from resource import RUSAGE_CHILDREN, getrusage
 import numpy as np
 import psutil
 
-from pipeline.simulator.parameters import Parameters
+from sling2sim2real.simulator.parameters import Parameters
 
 EVERY = 1.0  # s between two looks at the memory
 REPEATS = 3  # the best of them counts: others may use the machine too

@@ -23,15 +23,15 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import spearmanr
 
-from pipeline.base import errors
-from pipeline.base.errors import UserError
-from pipeline.base.machine import processor
-from pipeline.episode.episode import Episode
-from pipeline.identify.objective.box import SearchBox
-from pipeline.identify.posterior.likelihood import opening_time
-from pipeline.params import Params, expect_known, load
-from pipeline.params.identification import MethodParams
 from rig.physics.launch import launch
+from sling2sim2real.base import errors
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.machine import processor
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.identification.posterior.likelihood import opening_time
+from sling2sim2real.settings import Params, expect_known, load
+from sling2sim2real.settings.identification import MethodParams
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import aimed, recorded, sling_of
 from validation.campaigns.runner import OURS, PAPER

@@ -19,9 +19,9 @@ from functools import partial
 from pathlib import Path
 
 import sling2sim2real as s2s
-from pipeline.base import errors
-from pipeline.base.errors import UserError
-from pipeline.params import Params, load
+from sling2sim2real.base import errors
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.settings import Params, load
 from validation import orange
 from validation.campaigns import runner
 from validation.projects import with_section
@@ -78,10 +78,10 @@ def recorded(recording: str, work: Path, folder: Path | None) -> Path:
 
 def checked(path: Path, recording: str) -> tuple[list[dict], s2s.Episode | None]:
     """What the checks find, each with its concern, and the episode where there is one."""
-    from pipeline.recording.build import episode_of, process_pull
-    from pipeline.recording.checks.table import CONCERNS
-    from pipeline.recording.input.reader import read_recording
-    from pipeline.recording.pulls import Pull
+    from sling2sim2real.recording.build import episode_of, process_pull
+    from sling2sim2real.recording.checks.table import CONCERNS
+    from sling2sim2real.recording.input.reader import read_recording
+    from sling2sim2real.recording.pulls import Pull
 
     params, band = params_of(recording)
     concern = {

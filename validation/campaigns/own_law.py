@@ -20,18 +20,18 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.base import errors
-from pipeline.episode.episode import Episode
-from pipeline.episode.planned import planned_pull
-from pipeline.episode.signal import cutoff_hz
-from pipeline.identify.posterior.coordinates import Coordinates
-from pipeline.identify.posterior.likelihood import Failed, Likelihood, Tolerances
-from pipeline.identify.posterior.residuals import BINS, nearest
-from pipeline.params import Params, load
-from pipeline.params.lab import Dip
-from pipeline.simulator.interaction import Rollouts, interact
-from pipeline.simulator.model import ClampedBand
-from pipeline.simulator.replay import recorded_force
+from sling2sim2real.base import errors
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.episode.planned import planned_pull
+from sling2sim2real.episode.signal import cutoff_hz
+from sling2sim2real.identification.posterior.coordinates import Coordinates
+from sling2sim2real.identification.posterior.likelihood import Failed, Likelihood, Tolerances
+from sling2sim2real.identification.posterior.residuals import BINS, nearest
+from sling2sim2real.settings import Params, load
+from sling2sim2real.settings.lab import Dip
+from sling2sim2real.simulator.interaction import Rollouts, interact
+from sling2sim2real.simulator.model import ClampedBand
+from sling2sim2real.simulator.replay import recorded_force
 from validation.campaigns import runner
 from validation.campaigns.runner import OURS
 from validation.density import calibrated_by

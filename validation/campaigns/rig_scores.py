@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 from ruamel.yaml import YAML
 
-from pipeline.base.files import replacing, write_json
-from pipeline.base.schema import read_json
-from pipeline.episode.episode import Episode
-from pipeline.identify.clamps import calibrate_clamps
-from pipeline.identify.results.mounting import Mounting
-from pipeline.launching.surface.landing_map import LandingMap
-from pipeline.launching.trials.spread import landing_intervals
-from pipeline.params import Params
-from pipeline.simulator.model import ClampedBand
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.world import World
+from sling2sim2real.base.files import replacing, write_json
+from sling2sim2real.base.schema import read_json
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.identification.clamps import calibrate_clamps
+from sling2sim2real.identification.results.mounting import Mounting
+from sling2sim2real.launching.surface.landing_map import LandingMap
+from sling2sim2real.launching.trials.spread import landing_intervals
+from sling2sim2real.settings import Params
+from sling2sim2real.simulator.model import ClampedBand
 from validation.density import Calibrated
 
 TARGETS = np.linspace(1.525, 2.325, 9)  # m
@@ -43,7 +43,7 @@ def recorded(params: Params, band: str, folder: Path) -> Episode:
 
 def built(params: Params, band: str, raw: Path, folder: Path) -> Episode:
     """The episode of a recording that is there, clamps beside it; kept in `folder`."""
-    from pipeline.recording.build import build_episodes  # needs Open3D
+    from sling2sim2real.recording.build import build_episodes  # needs Open3D
 
     if not (folder / "mounting.json").exists():
         calibrated_clamps(params, band, build_episodes(raw, band, params)[0][0], folder)

@@ -19,10 +19,10 @@ from pathlib import Path
 from threading import Lock
 from typing import TypeVar
 
-from pipeline.base.errors import UserError
-from pipeline.base.layout import made
-from pipeline.base.machine import cores
-from pipeline.base.pool import Pool
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.layout import made
+from sling2sim2real.base.machine import cores
+from sling2sim2real.base.pool import Pool
 from validation.reports import plain
 
 THREADS = ("SLING_WORKERS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")

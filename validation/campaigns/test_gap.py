@@ -11,17 +11,17 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from pipeline.base.files import write_json
-from pipeline.identify.objective.box import SearchBox
-from pipeline.identify.results.theta import load_theta, parameters_of
-from pipeline.launching.surface.simulator import simulator
-from pipeline.launching.surface.stored import Stored
-from pipeline.params import Params, load
-from pipeline.params.identification import STEPS
-from pipeline.simulator.parameters import EXTRA
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.world import World
+from sling2sim2real.base.files import write_json
+from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.identification.results.theta import load_theta, parameters_of
+from sling2sim2real.launching.surface.simulator import simulator
+from sling2sim2real.launching.surface.stored import Stored
+from sling2sim2real.settings import Params, load
+from sling2sim2real.settings.identification import STEPS
+from sling2sim2real.simulator.parameters import EXTRA
 from validation.campaigns.runner import OURS, PAPER
 from validation.campaigns.test_orange import copy_of_the_project
 from validation.projects import ProjectCopy

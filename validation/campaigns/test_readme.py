@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from pipeline.base.code import ROOT
+from sling2sim2real.base.code import ROOT
 from validation.pages import CODE_BLOCK
 from validation.projects import ProjectCopy, copy_project
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.episode.episode import Episode
-from pipeline.simulator.interaction import interact
-from pipeline.simulator.launch import launch
-from pipeline.simulator.model import ClampedBand
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.rubber import NEO_HOOKEAN
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.simulator.interaction import interact
+from sling2sim2real.simulator.launch import launch
+from sling2sim2real.simulator.model import ClampedBand
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 from validation.engines import mujoco_flex
 from validation.simulator.experiment import setup_of
 from validation.simulator.finding import Bench, Measure, Theme

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.base.errors import UserError
-from pipeline.export.mesh import Tube, hand_path
-from pipeline.simulator.launch import ballistic_landing
-from pipeline.simulator.model import GRAVITY, ClampedBand, LaunchSetup
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.exporting.mesh import Tube, hand_path
+from sling2sim2real.simulator.launch import ballistic_landing
+from sling2sim2real.simulator.model import GRAVITY, ClampedBand, LaunchSetup
 
 LED = 1e3  # kg: the inertia of what leads a vertex; a step moves it by less than a nanometre
 SETTLE_STEP, SETTLE_STEPS = 0.02, 60

@@ -7,7 +7,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pipeline.simulator.rubber import uniaxial
+from sling2sim2real.simulator.rubber import uniaxial
 from validation.real import data
 
 COLUMNS = 5

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from pipeline.params.identification import LAWS
-from pipeline.simulator.rubber import RUBBER, TIMES, relaxed, softened, uniaxial, update, work
+from sling2sim2real.settings.identification import LAWS
+from sling2sim2real.simulator.rubber import RUBBER, TIMES, relaxed, softened, uniaxial, update, work
 from validation.real.data import Curve
 
 REACH = LAWS[RUBBER]

@@ -24,7 +24,7 @@ from mcap_ros2._dynamic import serialize_dynamic
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
-from pipeline.base.minimum_jerk import minimum_jerk
+from sling2sim2real.base.minimum_jerk import minimum_jerk
 
 TYPES = {
     "wrench": "geometry_msgs/msg/WrenchStamped",

@@ -16,12 +16,12 @@ import numpy as np
 import open3d as o3d
 from scipy.spatial.transform import Rotation
 
-from pipeline.recording.geometry import Geometry
-from pipeline.recording.input.camera import Camera
-from pipeline.recording.input.frames import Transform
-from pipeline.recording.input.reader import Recording, Stream
-from pipeline.recording.input.readings import Picture
-from pipeline.recording.view import Scene, View
+from sling2sim2real.recording.geometry import Geometry
+from sling2sim2real.recording.input.camera import Camera
+from sling2sim2real.recording.input.frames import Transform
+from sling2sim2real.recording.input.reader import Recording, Stream
+from sling2sim2real.recording.input.readings import Picture
+from sling2sim2real.recording.view import Scene, View
 from validation.recordings import strand
 from validation.recordings.bag import FLOOR
 from validation.recordings.strand import GRASP, RELEASE, REST, TIPS
@@ -257,7 +257,7 @@ def _millimetres(depth: np.ndarray, random) -> Picture:
 
 @dataclass
 class LookSignals:
-    """What the pipeline knows of the hand; the same names as pipeline.recording.signals."""
+    """What the pipeline knows of the hand; the same names as sling2sim2real.recording.signals."""
 
     time: np.ndarray
     origin: int = 0

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from rosbags.typesys import Stores, get_typestore
 
-from pipeline.base.files import replacing
+from sling2sim2real.base.files import replacing
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 FORCE, POSE, GRIPPER = "WrenchStamped", "PoseStamped", "JointState"

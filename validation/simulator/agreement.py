@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.identify.objective.box import SearchBox
-from pipeline.simulator.initial import drawn_guess, hanging_guess
-from pipeline.simulator.model import ClampedBand
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.records import Grip
-from pipeline.simulator.schedule import relaxation, steps
+from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.simulator.initial import drawn_guess, hanging_guess
+from sling2sim2real.simulator.model import ClampedBand
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.records import Grip
+from sling2sim2real.simulator.schedule import relaxation, steps
 from validation.simulator.experiment import (
     TIGHT,
     band_of,

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.simulator import launch
-from pipeline.simulator.model import GRAVITY
-from pipeline.simulator.parameters import Parameters
+from sling2sim2real.simulator import launch
+from sling2sim2real.simulator.model import GRAVITY
+from sling2sim2real.simulator.parameters import Parameters
 from validation.simulator.closed import String, cantilever, clamped_beam
 from validation.simulator.experiment import (
     TIGHT,

@@ -20,10 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import quad, solve_ivp
 
-from pipeline.simulator.material import material
-from pipeline.simulator.model import ClampedBand
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.rubber import TIMES
+from sling2sim2real.simulator.material import material
+from sling2sim2real.simulator.model import ClampedBand
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.rubber import TIMES
 
 
 @dataclass(frozen=True)

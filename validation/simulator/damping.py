@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from pipeline.simulator.model import ClampedBand
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.records import Grip
-from pipeline.simulator.rubber import RUBBER
+from sling2sim2real.simulator.model import ClampedBand
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.records import Grip
+from sling2sim2real.simulator.rubber import RUBBER
 from validation.simulator.agreement import random_thetas
 from validation.simulator.at_rest import STRING
 from validation.simulator.closed import String, oscillation

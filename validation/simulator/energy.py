@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.simulator.initial import hanging_guess
-from pipeline.simulator.interaction import schedule_of
-from pipeline.simulator.model import ClampedBand
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.records import Grip, Mode
-from pipeline.simulator.schedule import RELAX_STEPS
+from sling2sim2real.simulator.initial import hanging_guess
+from sling2sim2real.simulator.interaction import schedule_of
+from sling2sim2real.simulator.model import ClampedBand
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.records import Grip, Mode
+from sling2sim2real.simulator.schedule import RELAX_STEPS
 from validation.simulator.experiment import band_of, move
 from validation.simulator.finding import Bench, Measure, Theme
 from validation.simulator.reference import ReferenceRod

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.simulator.initial import fixed_frames, sections_of
-from pipeline.simulator.model import ClampedBand, LaunchSetup
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.records import Grip, Mode
-from pipeline.simulator.schedule import Schedule, statics, steps
-from pipeline.simulator.solver import Frames, Options, Slings, run
+from sling2sim2real.simulator.initial import fixed_frames, sections_of
+from sling2sim2real.simulator.model import ClampedBand, LaunchSetup
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.records import Grip, Mode
+from sling2sim2real.simulator.schedule import Schedule, statics, steps
+from sling2sim2real.simulator.solver import Frames, Options, Slings, run
 from validation.simulator.finding import Bench
 
 TIGHT = {"double": True, "tolerance": 1e-12}  # the kernel as exact as it gets

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.simulator.initial import sections_of
-from pipeline.simulator.model import GRAVITY, ClampedBand
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.records import Grip
-from pipeline.simulator.schedule import steps
+from sling2sim2real.simulator.initial import sections_of
+from sling2sim2real.simulator.model import GRAVITY, ClampedBand
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.records import Grip
+from sling2sim2real.simulator.schedule import steps
 from validation.simulator.experiment import TIGHT, band_of, launched, move, straight, straight_guess
 from validation.simulator.finding import Bench, Measure, Theme
 from validation.simulator.reference import ReferenceRod

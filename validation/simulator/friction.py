@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.simulator import Parameters, interact
-from pipeline.simulator.rubber import NEO_HOOKEAN
+from sling2sim2real.simulator import Parameters, interact
+from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 from validation.simulator.experiment import band_of
 from validation.simulator.finding import Bench, Measure, Theme, off
 from validation.synthetic import pull_and_release

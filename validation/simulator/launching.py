@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pipeline.simulator import ClampedBand, Launches, Parameters, launch
-from pipeline.simulator.initial import drawn_guess
-from pipeline.simulator.launch import schedule_of
-from pipeline.simulator.model import GRAVITY, LaunchHistory
-from pipeline.simulator.records import Grip
-from pipeline.simulator.schedule import relaxation
+from sling2sim2real.simulator import ClampedBand, Launches, Parameters, launch
+from sling2sim2real.simulator.initial import drawn_guess
+from sling2sim2real.simulator.launch import schedule_of
+from sling2sim2real.simulator.model import GRAVITY, LaunchHistory
+from sling2sim2real.simulator.records import Grip
+from sling2sim2real.simulator.schedule import relaxation
 from validation.simulator.experiment import band_of, rest, setup_of
 from validation.simulator.finding import Bench, Measure, Theme, off
 from validation.simulator.reference import ReferenceRod

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.simulator.records import Grip, Mode
+from sling2sim2real.simulator.records import Grip, Mode
 from validation.simulator.reference import ReferenceRod
 
 EXACT = 1e-11  # Newton's change below which a step is done [m]

@@ -1,4 +1,4 @@
-"""The rod of pipeline/simulator/rod.h in plain NumPy, float64, written a second time.
+"""The rod of sling2sim2real/simulator/rod.h in plain NumPy, float64, written a second time.
 
 A state x has shape (..., L, 9): per section the node and the directors a, b of the edge behind it.
 The columns of the deformation gradients, F = [g a b], and the differences of neighbouring frames
@@ -16,11 +16,11 @@ from functools import cached_property
 
 import numpy as np
 
-from pipeline.simulator.initial import fixed_frames
-from pipeline.simulator.material import material
-from pipeline.simulator.model import GRAVITY, ClampedBand
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.rubber import JOIN, RUBBER, TIMES, relaxed
+from sling2sim2real.simulator.initial import fixed_frames
+from sling2sim2real.simulator.material import material
+from sling2sim2real.simulator.model import GRAVITY, ClampedBand
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.rubber import JOIN, RUBBER, TIMES, relaxed
 
 TURNS = 1e-2  # of the modulus: keeps the spin of an unstressed edge regular
 HOLDS, TAUT = (

@@ -8,9 +8,9 @@ from itertools import product
 
 import numpy as np
 
-from pipeline.identify.objective.box import SearchBox
-from pipeline.simulator import THETA, ClampedBand, Parameters, interact, launch
-from pipeline.simulator.parameters import EXTRA
+from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.simulator import THETA, ClampedBand, Parameters, interact, launch
+from sling2sim2real.simulator.parameters import EXTRA
 from validation.simulator.agreement import random_thetas
 from validation.simulator.experiment import band_of, setup_of
 from validation.simulator.finding import Bench, Measure, Theme

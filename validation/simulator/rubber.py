@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.identify.objective.box import SearchBox
-from pipeline.simulator.initial import drawn_guess
-from pipeline.simulator.model import ClampedBand, LaunchHistory
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.records import Grip
-from pipeline.simulator.rubber import RUBBER
-from pipeline.simulator.schedule import steps
+from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.simulator.initial import drawn_guess
+from sling2sim2real.simulator.model import ClampedBand, LaunchHistory
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.records import Grip
+from sling2sim2real.simulator.rubber import RUBBER
+from sling2sim2real.simulator.schedule import steps
 from validation.simulator import agreement, damping, energy, launching, robustness
 from validation.simulator.closed import (
     flow_integral,
@@ -290,7 +290,7 @@ def section(bench: Bench) -> Theme:
             *survey(bench),
         ],
         "Mooney's share m, the upturn c, softening s, eight relaxing branches and one that flows"
-        " beside the neo-Hookean material (`pipeline/simulator/rubber.h`). E is the modulus after"
+        " beside the neo-Hookean material (simulator/rubber.h). E is the modulus after"
         " ten seconds, without flow."
         " Softening and each branch have a free energy; what they lose takes part in the balance.",
     )

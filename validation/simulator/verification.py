@@ -11,9 +11,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from pipeline.base.errors import UserError
-from pipeline.base.files import write_text
-from pipeline.base.machine import gpus
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.files import write_text
+from sling2sim2real.base.machine import gpus
 from validation.engines import checks as engines
 from validation.environment import environment
 from validation.reports import row

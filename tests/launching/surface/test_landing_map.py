@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from pipeline.launching.surface.landing_map import LandingMap, validation
-from pipeline.launching.surface.response_surface import OUTSIDE, TOO_MUCH_FORCE
+from sling2sim2real.launching.surface.landing_map import LandingMap, validation
+from sling2sim2real.launching.surface.response_surface import OUTSIDE, TOO_MUCH_FORCE
 from tests.policy import toy
 
 SIZE = (33, 25)

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from pipeline.launching.surface.landing_map import LandingMap
-from pipeline.launching.surface.response_surface import TOO_MUCH_FORCE
-from pipeline.launching.surface.simulated import SimulatedLandings
+from sling2sim2real.launching.surface.landing_map import LandingMap
+from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE
+from sling2sim2real.launching.surface.simulated import SimulatedLandings
 from tests.policy import toy
 
 BOX = {"draw_y": toy.DRAW_Y, "draw_z": toy.DRAW_Z, "size": (9, 7)}

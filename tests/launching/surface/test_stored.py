@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from torch import nn
 
-from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
-from pipeline.launching.surface.stored import Stored
-from pipeline.policy.export import write_onnx
-from pipeline.policy.train import Policy
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.files import write_json
+from sling2sim2real.launching.surface.stored import Stored
+from sling2sim2real.policy.export import write_onnx
+from sling2sim2real.policy.train import Policy
 from tests.policy.linear import write_policy
 
 BOX = SimpleNamespace(low=[-0.45, -0.30], high=[-0.25, -0.10])

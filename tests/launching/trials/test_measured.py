@@ -4,9 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.base.launch_table import DRAW, LANDING, MORE, file_of
-from pipeline.launching.trials.measured import Measured, load_scores, read_measured, save_scores
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.launch_table import DRAW, LANDING, MORE, file_of
+from sling2sim2real.launching.trials.measured import (
+    Measured,
+    load_scores,
+    read_measured,
+    save_scores,
+)
 
 KNOWN = ("ours", "theirs")
 HEAD = "draw_y_m,draw_z_m,landing_y_m"

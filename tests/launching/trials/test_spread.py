@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from pipeline.launching.trials.spread import (
+from sling2sim2real.launching.trials.spread import (
     MOST,
     landing_intervals,
     landing_spread,
     shortest,
     smoothed,
 )
-from pipeline.simulator.launch import CROSS
+from sling2sim2real.simulator.launch import CROSS
 from tests.policy import toy
 
 DRAWS = np.array([[-0.35, -0.2], [-0.3, -0.15]])

@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 from ruamel.yaml import YAML
 
-from pipeline.base.errors import UserError
-from pipeline.params import load
-from tests.report.run.conftest import BAND, METHOD
-from tests.report.run.conftest import root as root  # noqa: PLC0414
-from tests.report.run.conftest import template as template  # noqa: PLC0414
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.settings import load
+from tests.report.conftest import BAND, METHOD
+from tests.report.conftest import root as root  # noqa: PLC0414
+from tests.report.conftest import template as template  # noqa: PLC0414
 
 HEAD = "draw_y_m,draw_z_m,landing_y_m,target_m,method"
 

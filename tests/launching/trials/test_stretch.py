@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.episode.episode import Episode
-from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.launching.trials.stretch import recorded_stretch, stretch_of
 
 
 def test_stretch_of_a_345_triangle() -> None:

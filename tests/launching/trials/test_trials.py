@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.launching.trials.trials import SCHEMA, Batch, launch_virtually, table
-from pipeline.params import load
-from pipeline.simulator.launch import Launches, launch, limited
-from pipeline.simulator.model import ClampedBand, LaunchSetup
-from pipeline.simulator.parameters import Parameters
+from sling2sim2real.launching.trials.trials import SCHEMA, Batch, launch_virtually, table
+from sling2sim2real.settings import load
+from sling2sim2real.simulator.launch import Launches, launch, limited
+from sling2sim2real.simulator.model import ClampedBand, LaunchSetup
+from sling2sim2real.simulator.parameters import Parameters
 from tests.project import DEFAULTS
 
 PREDICTED = Launches(

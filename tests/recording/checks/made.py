@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
-from pipeline.recording.build import Checked
-from pipeline.recording.checks.finding import Finding
+from sling2sim2real.recording.build import Checked
+from sling2sim2real.recording.checks.finding import Finding
 
 
 def with_recording(done: Checked, **changes) -> Checked:

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.recording.checks import (
+from sling2sim2real.recording.checks import (
     camera,
     container,
     force,
@@ -20,11 +20,11 @@ from pipeline.recording.checks import (
     roles,
     times,
 )
-from pipeline.recording.checks.motion import pause
-from pipeline.recording.checks.table import CHECKS, findings_of
-from pipeline.recording.delays import Estimate
-from pipeline.recording.input.clocks import ClockRate
-from pipeline.recording.tips import LensFactor
+from sling2sim2real.recording.checks.motion import pause
+from sling2sim2real.recording.checks.table import CHECKS, findings_of
+from sling2sim2real.recording.delays import Estimate
+from sling2sim2real.recording.input.clocks import ClockRate
+from sling2sim2real.recording.tips import LensFactor
 from tests.project import with_
 from tests.recording.checks.made import abouts, with_facts, with_recording, with_results
 

@@ -7,13 +7,13 @@ import pytest
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from pipeline.base.errors import UserError
-from pipeline.recording.checks import force, hold, rates
-from pipeline.recording.checks.finding import Finding
-from pipeline.recording.input.pace import Bursts
-from pipeline.recording.processed import Processed
-from pipeline.recording.sensor import flat_top
-from pipeline.recording.tare import sensor_turns
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.checks import force, hold, rates
+from sling2sim2real.recording.checks.finding import Finding
+from sling2sim2real.recording.input.pace import Bursts
+from sling2sim2real.recording.processed import Processed
+from sling2sim2real.recording.sensor import flat_top
+from sling2sim2real.recording.tare import sensor_turns
 from tests.recording.checks.made import abouts, with_facts, with_recording
 
 

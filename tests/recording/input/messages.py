@@ -9,9 +9,9 @@ import numpy as np
 from mcap.records import Schema
 from scipy.spatial.transform import Rotation
 
-from pipeline.recording.input.container import Container
-from pipeline.recording.input.contents import Channel
-from pipeline.recording.input.topics import choose
+from sling2sim2real.recording.input.container import Container
+from sling2sim2real.recording.input.contents import Channel
+from sling2sim2real.recording.input.topics import choose
 
 COUNT, RATE = 200, 100.0
 TIMES = np.arange(COUNT) / RATE

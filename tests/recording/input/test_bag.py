@@ -10,11 +10,11 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 
-from pipeline.base.errors import UserError
-from pipeline.recording.input.bag import missing_parts, name_of, once, parts_of, sha256
-from pipeline.recording.input.container import read_container
-from pipeline.recording.input.contents import OVERHEAD
-from pipeline.recording.input.reader import read_recording
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.input.bag import missing_parts, name_of, once, parts_of, sha256
+from sling2sim2real.recording.input.container import read_container
+from sling2sim2real.recording.input.contents import OVERHEAD
+from sling2sim2real.recording.input.reader import read_recording
 from tests.recording.parts import metadata, split
 from tests.recording.test_foxglove import assert_same_recording
 from validation.recordings.bag import blind_bag, messages_of, write_bag
@@ -135,7 +135,7 @@ def test_a_bag_whose_parts_hold_too_much_is_refused(parts, monkeypatch, tmp_path
     total = sum(
         OVERHEAD + len(payload) for channel in read.channels for payload in channel.payloads
     )
-    monkeypatch.setattr("pipeline.recording.input.contents.MOST", total - 1)
+    monkeypatch.setattr("sling2sim2real.recording.input.contents.MOST", total - 1)
     with pytest.raises(UserError, match="holds more than"):
         read_container(parts[0])
     read_container(shutil.copy(parts[1], tmp_path / "alone.mcap"))

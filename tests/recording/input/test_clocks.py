@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.base.errors import UserError
-from pipeline.recording.delays import correct_delays
-from pipeline.recording.input import clocks
-from pipeline.recording.input.reader import Recording, read_recording
-from pipeline.recording.pulls import Pull
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.delays import correct_delays
+from sling2sim2real.recording.input import clocks
+from sling2sim2real.recording.input.reader import Recording, read_recording
+from sling2sim2real.recording.pulls import Pull
 from tests.project import with_
 from validation.recordings.bag import START, Truth, blind_bag, edit, head
 

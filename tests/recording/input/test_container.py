@@ -18,10 +18,10 @@ from mcap import records as kinds
 from mcap.data_stream import RecordBuilder
 from mcap.writer import CompressionType, Writer
 
-from pipeline.base.errors import UserError
-from pipeline.recording.input import contents
-from pipeline.recording.input.container import read_container
-from pipeline.recording.input.records import MAGIC
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.input import contents
+from sling2sim2real.recording.input.container import read_container
+from sling2sim2real.recording.input.records import MAGIC
 from tests.project import ROOT
 
 START = 10**18
@@ -210,8 +210,8 @@ def test_cameras_that_play_no_role_give_way_where_a_file_is_too_large(
 READ = """\
 import sys
 from pathlib import Path
-from pipeline.base.errors import UserError
-from pipeline.recording.input.container import read_container
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.input.container import read_container
 for path in sorted(Path(sys.argv[1]).glob("*.mcap")):
     try:
         found = read_container(path)

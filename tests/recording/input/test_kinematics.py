@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.base.errors import UserError
-from pipeline.recording.input import kinematics
-from pipeline.recording.input.kinematics import chain_of
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.input import kinematics
+from sling2sim2real.recording.input.kinematics import chain_of
 
 MIXED = """<robot name="mixed">
   <link name="world"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/>

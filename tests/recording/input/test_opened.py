@@ -8,10 +8,10 @@ import lz4.frame
 import pytest
 import zstandard
 
-from pipeline.base.errors import UserError
-from pipeline.recording.input import opened
-from pipeline.recording.input.bag import name_of, parts_of
-from pipeline.recording.input.container import read_container
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.input import opened
+from sling2sim2real.recording.input.bag import name_of, parts_of
+from sling2sim2real.recording.input.container import read_container
 from tests.recording.parts import metadata, split
 
 PACKERS = {".zst": zstandard.compress, ".gz": gzip.compress, ".lz4": lz4.frame.compress}

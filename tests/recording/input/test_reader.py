@@ -11,10 +11,10 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from pipeline.base.errors import UserError
-from pipeline.recording.geometry import geometry_of
-from pipeline.recording.input.container import read_container
-from pipeline.recording.input.reader import read_recording, recording_of
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.geometry import geometry_of
+from sling2sim2real.recording.input.container import read_container
+from sling2sim2real.recording.input.reader import read_recording, recording_of
 from validation.recordings.bag import START, blind_bag, edit, head
 
 

@@ -10,10 +10,10 @@ from mcap.records import Schema
 from mcap_ros2._dynamic import serialize_dynamic
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from pipeline.base.errors import UserError
-from pipeline.recording.input import kinematics
-from pipeline.recording.input.contents import Channel
-from pipeline.recording.input.decode import Unreadable
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.input import kinematics
+from sling2sim2real.recording.input.contents import Channel
+from sling2sim2real.recording.input.decode import Unreadable
 from tests.recording.input.messages import (
     COUNT,
     FORCE,

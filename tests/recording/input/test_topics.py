@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from mcap.records import Schema
 
-from pipeline.base.errors import UserError
-from pipeline.recording.input.contents import Channel
-from pipeline.recording.input.topics import camera_of
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.input.contents import Channel
+from sling2sim2real.recording.input.topics import camera_of
 from tests.recording.input.messages import (
     CAMERA,
     PLACES,

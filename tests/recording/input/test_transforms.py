@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.recording.input.container import Container
-from pipeline.recording.input.transforms import transforms_of
+from sling2sim2real.recording.input.container import Container
+from sling2sim2real.recording.input.transforms import transforms_of
 from tests.recording.input.messages import channel
 
 

@@ -12,12 +12,18 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pipeline.base.errors import UserError
-from pipeline.recording.build import Checked, build_episodes, episode_of, process, process_pull
-from pipeline.recording.input.reader import read_recording
-from pipeline.recording.masks import masker
-from pipeline.recording.pulls import Pull
-from pipeline.recording.view import View
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.build import (
+    Checked,
+    build_episodes,
+    episode_of,
+    process,
+    process_pull,
+)
+from sling2sim2real.recording.input.reader import read_recording
+from sling2sim2real.recording.masks import masker
+from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.recording.view import View
 from tests.project import with_
 from tests.recording.parts import joined
 from validation.recordings import looks

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from pipeline.launching.surface.aim import INSET, NEAR
-from pipeline.launching.surface.landing_map import LandingMap
 from rig.oracle.aim import hit, least_sensitive_draw, sensitivity
+from sling2sim2real.launching.surface.aim import INSET, NEAR
+from sling2sim2real.launching.surface.landing_map import LandingMap
 from tests.policy import toy
 
 TARGETS = (1.725, 1.925, 2.125)

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.report.run.results import load_floor
+from pipeline.report.results import load_floor
 from rig.oracle.floor import errors_of, trial_numbers
+from sling2sim2real.base.errors import UserError
 
 
 def test_numbers_begin_with_the_trials_own(params) -> None:

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.params import Params
-from pipeline.params.lab import Dip
 from rig.draw import sampled
 from rig.physics.launch import launch
 from rig.physics.motion import OPEN, PULL, PULLED, HandMotion
 from rig.physics.world import string_of
 from rig.recorder.interaction import hang, pull_and_release
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.settings import Params
+from sling2sim2real.settings.lab import Dip
 from tests.project import with_
 
 HALFWAY = Dip(at=0.5, depth=0.05, out_time=0.25, back_time=0.5)

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.base.native import start, wp
-from pipeline.params import load
-from pipeline.simulator.interaction import interact
-from pipeline.simulator.model import ClampedBand
-from pipeline.simulator.parameters import Parameters
+from sling2sim2real.base.native import start, wp
+from sling2sim2real.settings import load
+from sling2sim2real.simulator.interaction import interact
+from sling2sim2real.simulator.model import ClampedBand
+from sling2sim2real.simulator.parameters import Parameters
 from tests.project import DEFAULTS
 from validation import synthetic
 from validation.benchmarks import throughput as bench

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from app.cli import parser
-from pipeline.base.errors import UserError
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.cli.cli import parser
 from tests.project import write_files
 from validation.benchmarks import times as bench
 from validation.benchmarks.times import MeasuredStep

@@ -5,8 +5,8 @@ import sys
 import numpy as np
 import pytest
 
-from pipeline.base.errors import UserError
-from pipeline.export.mesh import CLAMPED, Tube
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.exporting.mesh import CLAMPED, Tube
 from validation.engines import checks
 from validation.simulator.closed import String
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from pipeline.export.mesh import Tube
+from sling2sim2real.exporting.mesh import Tube
 from tests.validation.engines.test_mesh import elastic_force
 from validation.engines import checks
 from validation.engines.mujoco_flex import FlexBand

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.simulator.parameters import Parameters
+from sling2sim2real.simulator.parameters import Parameters
 from validation.simulator import damping
 from validation.simulator.agreement import random_thetas
 from validation.simulator.damping import STATES

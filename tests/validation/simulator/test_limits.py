@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.rubber import NEO_HOOKEAN
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 from validation.simulator import (
     agreement,
     at_rest,

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.simulator.initial import hanging_guess
-from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.rubber import NEO_HOOKEAN
+from sling2sim2real.simulator.initial import hanging_guess
+from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 from validation.simulator.closed import String
 from validation.simulator.experiment import band_of
 from validation.simulator.march import jacobian

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.simulator.parameters import Parameters
+from sling2sim2real.simulator.parameters import Parameters
 from validation.simulator.closed import String
 from validation.simulator.experiment import band_of
 from validation.simulator.reference import TURNS, ReferenceRod

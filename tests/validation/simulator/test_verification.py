@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from pipeline.base.errors import UserError
+from sling2sim2real.base.errors import UserError
 from validation.simulator import verification as report
 from validation.simulator.finding import Measure, Theme, off
 

@@ -1,0 +1,57 @@
+"""`sling flow`: run stale stages in parallel, as a flow of Prefect's.
+
+    python -m pipeline.flow [STAGE ...] [--workers N] [--gpus N] [--dask ADDRESS] [--slurm FILE]
+
+Run in the project's folder. A STAGE is one of `dvc stage list`, or a step for all its stages.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.flow import dvc, server
+from sling2sim2real.base import errors
+from sling2sim2real.base.disk import expect_ready
+from sling2sim2real.cli import arguments as kinds
+from sling2sim2real.cli.command_line import Parser
+from sling2sim2real.settings import load
+
+
+def parser() -> Parser:
+    """Command line of `sling flow`."""
+    parser = Parser(prog="sling flow", description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument(
+        "targets", nargs="*", metavar="STAGE", help="or a step for all its stages; default: all"
+    )
+    parser.add_argument(
+        "--workers",
+        type=kinds.count,
+        metavar="N",
+        help="stages at a time; default: as many as cores, 16 on a cluster",
+    )
+    parser.add_argument(
+        "--gpus", type=kinds.count, metavar="N", help="GPU stages at a time; default 1"
+    )
+    parser.add_argument(
+        "--dask", type=kinds.address, metavar="ADDRESS", help="of a scheduler: its workers run"
+    )
+    parser.add_argument("--slurm", type=Path, metavar="FILE", help="of SLURM jobs, which run")
+    return parser
+
+
+def main() -> None:
+    given, root = parser().parse_args(), Path.cwd()
+    load()  # a mistake in params.yaml is reported once, and not by each stage
+    expect_ready(root)
+    graph = dvc.stale(root, given.targets)
+    if not graph:
+        print("nothing is stale")
+        return
+    server.configure(root)
+    from pipeline.flow.flow import run  # Prefect reads its settings when it is imported
+
+    print(run(root, graph, given.workers, given.gpus, given.dask, given.slurm))
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -1,1 +1,0 @@
-"""The report: chapters, tables, figures, the page."""

@@ -1,0 +1,1 @@
+"""What a Python program calls; `import sling2sim2real` has all of it."""

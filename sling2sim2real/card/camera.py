@@ -1,0 +1,79 @@
+"""The colour pictures of a recorded pull, and where points of frame O are seen in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sling2sim2real.base.layout import NotMade
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.recording.geometry import EpisodeGeometry
+from sling2sim2real.recording.input import images
+from sling2sim2real.recording.input.camera import Camera
+from sling2sim2real.recording.input.frames import Transform
+from sling2sim2real.recording.input.reader import read_recording
+from sling2sim2real.recording.input.readings import Picture
+from sling2sim2real.settings.lab import SetupParams
+from sling2sim2real.settings.recording import DelayParams
+
+CLOSEST = 0.05  # m before the camera
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """N colour pictures on an episode's clock.
+
+    Attributes:
+        time: Of each [s], as the episode has the camera's stamps, shape (N,).
+        camera, pose: The colour camera, and frame O to its frame.
+    """
+
+    time: np.ndarray
+    camera: Camera
+    pose: Transform
+    _packed: Sequence[Picture]
+
+    @classmethod
+    def of(cls, path: Path, episode: Episode, setup: SetupParams) -> Pictures:
+        """Read the pictures of the recording that an episode was made from.
+
+        Raises:
+            NotMade: It is not there.
+            UserError: It cannot be read, or an older version made the episode.
+        """
+        if not path.exists():
+            raise NotMade(path)
+        geometry = EpisodeGeometry.of_episode(episode.metadata, episode.band)
+        late = _applied(episode, "camera")
+        delays = DelayParams(pose=_applied(episode, "pose"), camera=late)
+        color = read_recording(path, setup, delays).color
+        time = color.seconds(episode.metadata["input"]["start_ns"])
+        return cls(time, geometry.camera, geometry.camera_to_fork, color.values)
+
+    def __getitem__(self, number: int) -> np.ndarray | None:
+        """A picture, BGR, shape (H, W, 3); None where it is damaged."""
+        try:
+            return images.color(self._packed[number])
+        except images.Undecodable:
+            return None
+
+    def latest(self, time: float) -> int:
+        """Number of the last picture at or before a moment, or else of the first."""
+        return max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Pixels (u, v) of points (N, 3), shape (N, 2); NaN of those behind the camera."""
+        seen = self.pose.apply(points)
+        pixels = np.full((len(points), 2), np.nan)
+        ahead = seen[:, 2] > CLOSEST
+        pixels[ahead] = self.camera.project(seen[ahead])
+        return pixels
+
+
+def _applied(episode: Episode, name: str) -> float:
+    """Delay of the stamps of pose or camera that was taken off for the episode [s]."""
+    delay = (episode.metadata["preprocessing"].get("delays") or {}).get(name) or {}
+    return delay["value"] if delay.get("applied") else 0.0

@@ -1,0 +1,153 @@
+"""What is known of a band, in the plain numbers that the verdict asks for."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import ndtri
+
+from sling2sim2real.card.inputs import CardInputs
+from sling2sim2real.card.values import boxes
+from sling2sim2real.card.verdict import FURTHER, Findings
+from sling2sim2real.drawing.names import as_code, as_text
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.episode.phases import NO_UNLOADING, phases_of_hand, unseen
+from sling2sim2real.launching.trials.spread import LEVEL
+from sling2sim2real.quantities import QUANTITIES, rounded
+from sling2sim2real.settings import Params
+
+OUTSIDE = float(ndtri((1 + LEVEL) / 2))  # standard deviations: beyond the interval
+NEARLY = 0.02  # m below the highest that the hand goes: it no longer lifts
+SLACK = 0.3  # force along over force across the horizontal, below which the band only hangs
+FEWEST = 10  # samples
+LIGHTEST = 0.05  # N: a sensor's zero is no surer
+SIDE = 0.01  # of a box's width: as near is at its side
+
+
+def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
+    """Findings of a band, from files and launches.
+
+    Args:
+        force: Of the first pull, simulated, at its samples [N], shape (T, 3).
+    """
+    confidence, aims = inputs.confidence, inputs.aims
+    recordings = confidence.get("recordings", [])
+
+    def worst(name: str) -> float:
+        return max((recording[name] for recording in recordings), default=0.0)
+
+    launched = inputs.launched
+    scored = launched.loc[launched.stretch <= FURTHER * inputs.recorded_stretch]
+    scored = scored.loc[scored.predicted_low.notna()]
+    landing, low, high = (scored[n] for n in ("landing_y", "predicted_low", "predicted_high"))
+    off, share = landing - scored.predicted_y, landing / scored.predicted_y - 1
+    evidence = confidence.get("launches", [])
+    unlikely = [launch.get("z_without_it") for launch in evidence]
+    left = [abs(launch["left"]) for launch in evidence if launch["left"] is not None]
+    miss = np.abs(aims.landing - aims.target)
+    return Findings(
+        cautions=_cautions(inputs.episodes),
+        settled=confidence.get("settled"),
+        effective=confidence.get("effective_samples"),
+        force=worst("force_rms"),
+        held=worst("held_rms"),
+        recoil=worst("recoil_rms"),
+        recoil_seen=any(recording["pictures"] for recording in recordings) or not recordings,
+        disagreement=confidence.get("disagreement", 1.0),
+        odd=_odd(recordings),
+        at_sides=_at_sides(inputs),
+        stretch=float(aims.stretch.max()),
+        recorded_stretch=inputs.recorded_stretch,
+        hold_force=float(np.nanmax(aims.hold_force, initial=0.0)),
+        max_force=inputs.params.setup.max_force,
+        failures=[
+            f"The launch at {target:g} m fails in simulation: {failure}."
+            for target, failure in zip(aims.target, aims.failure, strict=True)
+            if failure
+        ],
+        converged=inputs.policy["training"]["converged"],
+        miss=float(np.nanmax(miss, initial=0.0)),
+        half_width=float(aims.half_width.max()),
+        outside=int(((landing < low) | (landing > high)).sum()),
+        scores=len(scored),
+        off=_known(off.abs().mean()),
+        bias=_known(share.mean()),
+        bias_error=_known(share.sem()),
+        bias_of_half=_known((2 * off / (high - low)).mean()),
+        kind=" and ".join(dict.fromkeys(scored.kind)),
+        left=max(left, default=0.0),
+        observed=len(left),
+        surprising=sum(abs(z) > OUTSIDE for z in unlikely if z is not None),
+        carried=None if force is None else carried(inputs.episode, force),
+        density=_density(inputs.params, inputs.band),
+        unloaded=any(
+            NO_UNLOADING not in unseen(phases_of_hand(episode)) for episode in inputs.episodes
+        ),
+    )
+
+
+def carried(episode: Episode, force: np.ndarray) -> float | None:
+    """Measured over simulated vertical force on the hand that has lifted the slack band.
+
+    Args:
+        force: Simulated, at the episode's samples [N], shape (T, 3).
+    """
+    held = (episode.time > episode.grasp_time) & (episode.time < episode.release_time)
+    height = np.where(held, episode.position[:, 2], -np.inf)
+    lifted = held & (height > height.max() - NEARLY)
+    side = np.linalg.norm(force[:, :2], axis=1)
+    slack = lifted & (side < SLACK * np.abs(force[:, 2]))
+    if slack.sum() < FEWEST or abs(weight := force[slack, 2].mean()) < LIGHTEST:
+        return None
+    return float(episode.force[slack, 2].mean() / weight)
+
+
+def _known(value: float) -> float:
+    """0 of too few launches."""
+    return float(value) if np.isfinite(value) else 0.0
+
+
+def _density(params: Params, band: str) -> float | None:
+    """Density of a band that somebody weighed [kg/m^3]; None for the rig's."""
+    sizes = params.bands[band]
+    return None if sizes.source == "rig" else sizes.density
+
+
+def _cautions(episodes: list[Episode]) -> list[tuple[str, str]]:
+    """What of each pull's recording costs accuracy, and what to do about it: sentences."""
+    cautions = []
+    for episode in episodes:
+        source = episode.metadata["input"]
+        pull = f"pull {source.get('pull', 1)} of {as_code(source['file'])}"
+        for caution in episode.cautions:
+            cure = as_text(caution["cure"])
+            sentences = f"In {pull}, {as_text(caution['what'])}.", f"For {pull}: {cure}."
+            cautions.append(sentences)
+    return cautions
+
+
+def _odd(recordings: list[dict]) -> str:
+    """File and pull that all others predict worst; "" of fewer than two."""
+    predicted = [recording for recording in recordings if "without_it" in recording]
+    if not predicted:
+        return ""
+    source = max(predicted, key=lambda recording: recording["without_it"]["misfit"])["source"]
+    return f"pull {source.get('pull', 1)} of {as_code(source.get('file', '?'))}"
+
+
+def _at_sides(inputs: CardInputs) -> list[tuple[str, str]]:
+    """Searched parameters at a side of their box that nature does not set: label and side."""
+    at_sides, searched = [], boxes(inputs.params, inputs.method)
+    for name, value in inputs.theta["theta"].items():
+        if name not in searched:
+            continue
+        box = searched[name]
+        place = box.place(value)
+        sides = {"lower": place < SIDE and box.low != 0, "upper": place > 1 - SIDE}
+        quantity = QUANTITIES[name]
+        ends = " to ".join(f"{rounded(quantity.factor * x):.6g}" for x in (box.low, box.high))
+        at_sides += [
+            (quantity.label, f"{side} side of its box, {f'{ends} {quantity.unit}'.strip()}")
+            for side, there in sides.items()
+            if there
+        ]
+    return at_sides

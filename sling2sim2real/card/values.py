@@ -1,0 +1,90 @@
+"""A band's values with their intervals, as people read them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from sling2sim2real.identification.posterior.coordinates import MOST_DRAG, MOST_LOST
+from sling2sim2real.quantities import QUANTITIES, rounded
+from sling2sim2real.settings import Params
+from sling2sim2real.simulator.parameters import EXTRA
+
+
+@dataclass(frozen=True)
+class ShownValue:
+    """One value in its quantity's unit.
+
+    Attributes:
+        low, high: None where no interval is known.
+        prior: Interval of what is known without the recording; None where it is not.
+        identified: The recording says more than that.
+    """
+
+    name: str
+    label: str
+    unit: str
+    value: float
+    low: float | None
+    high: float | None
+    fixed: bool
+    prior: tuple[float, float] | None = None
+    identified: bool = True
+
+
+def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
+    """Values of a θ file's content, in the order of QUANTITIES.
+
+    Args:
+        fixed: Parameters that the method did not search.
+    """
+    confidence = theta.get("confidence") or {}
+    intervals = {**confidence.get("derived", {}), **confidence.get("parameters", {})}
+    numbers_of = dict(theta["theta"])
+    if confidence:  # else nothing was searched but θ
+        numbers_of["air_drag"] = theta.get("nuisances", {}).get("air_drag") or 0.0
+        numbers_of |= {name: theta[name] for name in EXTRA if name in theta}
+    shown_values = []
+    for name, quantity in QUANTITIES.items():
+        if name not in numbers_of:
+            continue
+        value, interval = rounded(quantity.factor * numbers_of[name]), intervals.get(name, {})
+        still = name in fixed
+        ends = (None if still else interval.get(end) for end in ("low", "high"))
+        low, high = (None if x is None else rounded(quantity.factor * x) for x in ends)
+        prior, identified = interval.get("prior"), interval.get("identifiable", True)
+        if prior:
+            prior = rounded(quantity.factor * prior[0]), rounded(quantity.factor * prior[1])
+        cells = quantity.label, quantity.unit, value, low, high, still, prior, identified
+        shown_values.append(ShownValue(name, *cells))
+    return shown_values
+
+
+class SearchedRange(NamedTuple):
+    """Within which a method searches a parameter [SI]; `scale` is linear or log."""
+
+    low: float
+    high: float
+    scale: str = "linear"
+
+    def place(self, value: float) -> float:
+        """Place of a value in the range, from 0 at the lower end to 1 at the upper one."""
+        ends = np.array([value, self.low, self.high], float)
+        if self.scale == "log":
+            ends = np.log(ends)
+        return float((ends[0] - ends[1]) / (ends[2] - ends[1]))
+
+
+def boxes(params: Params, method: str) -> dict[str, SearchedRange]:
+    """Ranges of what a method searches, by name."""
+    config = params.methods[method]
+    ranges = {name: SearchedRange(box.low, box.high, box.scale) for name, box in params.parameters}
+    ranges |= {name: SearchedRange(*ends) for name, ends in config.bounds.items()}
+    ranges |= {
+        "air_drag": SearchedRange(0.0, MOST_DRAG),
+        "turn_damping": SearchedRange(0.0, 1.0),
+        "returned_share": SearchedRange(np.exp(-MOST_LOST), np.exp(MOST_LOST), "log"),
+    }
+    return {name: box for name, box in ranges.items() if name not in config.fixed}

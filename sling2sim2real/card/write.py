@@ -1,0 +1,85 @@
+"""Write reports/bands/<band>/: what is known of one band, for a person and for a program."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from sling2sim2real.base.files import replacing_folder, write_json, write_text
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.card import figures
+from sling2sim2real.card.animation import animate
+from sling2sim2real.card.camera import Pictures
+from sling2sim2real.card.conclusion import Conclusion
+from sling2sim2real.card.inputs import CardInputs, card_inputs
+from sling2sim2real.card.simulated import simulate
+from sling2sim2real.card.text import card_text
+from sling2sim2real.card.values import boxes
+from sling2sim2real.drawing.page import page
+from sling2sim2real.settings import Params
+
+
+def write(params: Params, band: str, method: str, root: str | Path = ".") -> dict:
+    """Write a band's card; return what card.json says. Raises UserError: an input is missing."""
+    inputs = card_inputs(params, band, method, root)
+    episode, setup = inputs.episode, params.setup
+    layout = Layout(Path(root))
+    recording = layout.raw(band) / episode.metadata["input"]["file"]
+    pictures = Pictures.of(recording, episode, setup)
+    simulated = simulate(params, band, method, episode, inputs.theta)
+
+    concluded = Conclusion.of(inputs, simulated.force)
+    card = content(inputs, concluded)
+    with replacing_folder(layout.card(band)) as folder:
+        figures.camera(folder / "camera.webp", episode, simulated, pictures)
+        figures.force(folder / "force.png", episode, simulated)
+        figures.values(folder / "values.png", concluded.values, boxes(params, method))
+        figures.landings(folder / "landings.png", inputs)
+        animate(folder / "animation.webp", episode, simulated, pictures, setup.fork_width)
+        write_text(folder / "README.md", card_text(inputs, concluded))
+        write_json(folder / "card.json", card)
+        text = card_text(inputs, concluded, linked=False)
+        write_text(folder / "index.html", page(text, folder, f"{band}: {concluded.verdict}"))
+    return card
+
+
+def content(inputs: CardInputs, concluded: Conclusion) -> dict:
+    """What card.json says; numbers are rounded, so that kinds of CPU agree."""
+    aims = inputs.aims
+    draws = [
+        {
+            "target_m": target,
+            "draw_y_m": _rounded(draw[0], 4),
+            "draw_z_m": _rounded(draw[1], 4),
+            "predicted_landing_m": _rounded(landing, 3),
+            "interval_90_m": _ends(ends),
+            "hold_force_n": _rounded(force, 2),
+        }
+        for target, draw, landing, ends, force in zip(
+            aims.target.tolist(), aims.draw, aims.landing, aims.interval, aims.hold_force,
+            strict=True,
+        )
+    ]  # fmt: skip
+    return {
+        "band": inputs.band,
+        "method": inputs.method,
+        "verdict": concluded.verdict,
+        "reasons": concluded.reasons,
+        "values": [asdict(value) for value in concluded.values],
+        "draws": draws,
+        "next": concluded.steps,
+        "theta_file": Layout().theta(inputs.band, inputs.method).as_posix(),
+        "recordings": len(inputs.recordings),
+        "pulls": len(inputs.episodes),
+        "launches": inputs.launches,
+    }
+
+
+def _ends(interval: np.ndarray) -> list[float] | None:
+    return [round(end, 3) for end in interval.tolist()] if np.isfinite(interval).all() else None
+
+
+def _rounded(value: float, digits: int) -> float | None:
+    return round(float(value), digits) if np.isfinite(value) else None

@@ -1,0 +1,1 @@
+"""The command line `sling`, and what stands behind it."""

@@ -1,0 +1,140 @@
+"""A plan as files: CSV samples, ROS 2 messages as JSON, a picture."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from sling2sim2real.cli.plan.trajectory import Trajectory
+from sling2sim2real.recording.input.frames import Transform
+
+COLUMNS = (
+    "t x y z qx qy qz qw vx vy vz ax ay az opening phase".split()  # s, m, m/s, m/s^2; robot's base
+)
+
+
+def csv_text(trajectory: Trajectory, base: Transform, hand: np.ndarray, rate: float) -> str:
+    """Samples at `rate` [Hz] from the first to the last moment, in the robot's base.
+
+    Args:
+        base: Frame O to the base.
+        hand: Quaternion of the hand in the base, x, y, z, w.
+    """
+    time = np.arange(int(np.ceil(trajectory.duration * rate - 1e-9)) + 1) / rate
+    rows = np.column_stack(
+        [
+            time,
+            base.apply(trajectory.position(time)),
+            np.tile(hand, (len(time), 1)),
+            base.rotation.apply(trajectory.position(time, 1)),
+            base.rotation.apply(trajectory.position(time, 2)),
+            trajectory.opening(time),
+        ]
+    )
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for row, phase in zip((rows + 0.0).round(9).tolist(), trajectory.phase_at(time), strict=True):
+        writer.writerow([*(f"{value:.9g}" for value in row), phase])
+    return text.getvalue()
+
+
+def trajectory_message(
+    trajectory: Trajectory, base: Transform, hand: np.ndarray, frame: str
+) -> dict:
+    """trajectory_msgs/MultiDOFJointTrajectory with a point at each knot of the spline.
+
+    The cubic through the positions and velocities of neighbouring points is the plan itself.
+    """
+    knots = trajectory.path.x
+    rotation = dict(zip("xyzw", map(float, hand), strict=True))
+
+    def vectors(derivative: int) -> list[dict]:
+        return [_vector(v) for v in base.rotation.apply(trajectory.position(knots, derivative))]
+
+    places = [_vector(v) for v in base.apply(trajectory.position(knots))]
+    rest = _vector(np.zeros(3))
+    return {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": frame},
+        "joint_names": ["tcp"],
+        "points": [
+            {
+                "transforms": [{"translation": place, "rotation": rotation}],
+                "velocities": [{"linear": speed, "angular": rest}],
+                "accelerations": [{"linear": acceleration, "angular": rest}],
+                "time_from_start": _duration(time),
+            }
+            for time, place, speed, acceleration in zip(
+                knots, places, vectors(1), vectors(2), strict=True
+            )
+        ],
+    }
+
+
+def gripper_commands(
+    trajectory: Trajectory, position: Callable[[float], float], force: float
+) -> list[dict]:
+    """control_msgs/GripperCommand with the time of each: open, close, open.
+
+    Args:
+        position: What the gripper takes as `position` for a distance between the fingers [m].
+        force: Of each finger [N], as `max_effort`.
+    """
+    moments = [(0.0, trajectory.openings[0])]
+    for phase, start in zip(trajectory.phases, trajectory.times, strict=False):
+        if phase.opening != moments[-1][1]:
+            moments.append((start, phase.opening))
+    return [
+        {
+            "time_from_start": _duration(time),
+            "command": {"position": position(float(opening)), "max_effort": float(force)},
+        }
+        for time, opening in moments
+    ]
+
+
+def draw_picture(trajectory: Trajectory, path: Path | io.BytesIO) -> None:
+    """Path, speed and acceleration, frame O."""
+    from matplotlib.figure import Figure
+    from matplotlib.style import context
+
+    from sling2sim2real.drawing.styles import COLORS, INK, THEME
+
+    time = np.linspace(0, trajectory.duration, 1000)
+    with context(THEME):
+        figure = Figure(figsize=(7.0, 5.5))
+        axes = figure.subplots(3, sharex=True)
+        for axis, name, color in zip((1, 2), "yz", COLORS, strict=False):
+            axes[0].plot(time, trajectory.position(time)[:, axis], color=color, label=name)
+        for i, (name, unit) in enumerate((("speed", "m/s"), ("acceleration", "m/s²")), start=1):
+            size = np.linalg.norm(trajectory.position(time, i), axis=1)
+            axes[i].plot(time, size, color=INK)
+            axes[i].set_ylabel(f"{name} [{unit}]")
+        axes[0].set_ylabel("frame O [m]")
+        axes[0].legend()
+        axes[2].set_xlabel("time [s]")
+        for phase, start in zip(trajectory.phases, trajectory.times, strict=False):
+            for panel in axes:
+                panel.axvline(start, color=INK, linewidth=0.4)
+            axes[0].annotate(
+                phase.name,
+                (start, 1.0),
+                xycoords=("data", "axes fraction"),
+                rotation=40,
+                fontsize=7,
+            )
+        figure.savefig(path, dpi=150, format="png")
+
+
+def _vector(v: np.ndarray) -> dict[str, float]:
+    x, y, z = (np.round(v, 12) + 0.0).tolist()  # no negative zeros
+    return {"x": x, "y": y, "z": z}
+
+
+def _duration(time: float) -> dict[str, int]:
+    seconds, nanoseconds = divmod(round(float(time) * 1e9), 10**9)
+    return {"sec": seconds, "nanosec": nanoseconds}

@@ -1,0 +1,323 @@
+"""`sling plan`: how a robot has to move so that its recording of a band can be used."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.files import replacing, write_json, write_text
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.cli.arguments import PULLS
+from sling2sim2real.cli.plan import limits, messages
+from sling2sim2real.cli.plan.force import Earlier, Held, Prediction, predict, read_earlier
+from sling2sim2real.cli.plan.hand import along_pull, quaternion
+from sling2sim2real.cli.plan.pull import hanging_middle, trajectory_of
+from sling2sim2real.cli.plan.trajectory import Trajectory
+from sling2sim2real.cli.pose import fork_in_base
+from sling2sim2real.cli.sizes import band_to_come
+from sling2sim2real.recording.geometry import FORK
+from sling2sim2real.recording.input.frames import Transform
+from sling2sim2real.settings import Params, expect_known
+from sling2sim2real.settings.lab import Gripper
+
+INFORMATIVE, PAPER = PULLS
+MOST_PULLS = 10  # a file of them is half a gigabyte
+NO_BASE = (
+    "nothing says where it stands in the robot's base, so all is in frame O, which no robot knows:"
+    " `sling setup` asks for it, or give a --recording whose /tf_static has it"
+)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A recording to be made.
+
+    Attributes:
+        band: Its name.
+        trajectory: Of the tool centre point, frame O.
+        base: Frame O to the robot's base; the identity where nothing tells it.
+        base_source: Where that came from, in words; None: from nowhere, all is in frame O.
+        frame: Name of the base, or of frame O.
+        hand: Orientation of the hand there, quaternion x, y, z, w.
+        gripper: Its settings.
+        stretch: Of the drawn band.
+        force: Predicted, to hold it.
+        max_force: That the arm may hold [N].
+        grip_force: Of each finger [N].
+        held_time, most_time: From grasp to release, and what the episode leaves for it [s].
+        hanging_source: Where the height of the hanging middle came from.
+        pull: Of PULLS.
+        dips: How many the pull has.
+    """
+
+    band: str
+    trajectory: Trajectory
+    base: Transform
+    base_source: str | None
+    frame: str
+    hand: np.ndarray
+    gripper: Gripper
+    stretch: float
+    force: Prediction
+    max_force: float
+    grip_force: float
+    held_time: float
+    most_time: float
+    hanging_source: str
+    pull: str
+    dips: int
+
+    def rows(self) -> list[dict]:
+        """One row a phase, numbers in SI units."""
+        trajectory = self.trajectory
+        speeds, accelerations = trajectory.peaks(1), trajectory.peaks(2)
+        return [
+            {
+                "phase": phase.name,
+                "start_s": round(float(trajectory.times[i]), 6),
+                "end_s": round(float(trajectory.times[i + 1]), 6),
+                "fork": _plain(phase.to),
+                "base": _plain(self.base.apply(phase.to)),
+                "opening_m": float(phase.opening),
+                "max_speed_m_s": float(speeds[i]),
+                "max_acceleration_m_s2": float(accelerations[i]),
+            }
+            for i, phase in enumerate(trajectory.phases)
+        ]
+
+    def content(self) -> dict:
+        """Everything that the plan says of itself, for JSON."""
+        return {
+            "band": self.band,
+            "frame": self.frame,
+            "base_to_fork": self._fork_in_base,
+            "base_to_fork_source": self.base_source,
+            "orientation": _plain(self.hand),
+            "hanging_source": self.hanging_source,
+            "duration_s": round(self.trajectory.duration, 6),
+            "grasp_s": round(self.trajectory.start_of("grasp"), 6),
+            "release_s": round(self.trajectory.start_of("release"), 6),
+            "pulls": sum(phase.name == "release" for phase in self.trajectory.phases),
+            "held_s": round(self.held_time, 6),
+            "held_most_s": round(self.most_time, 6),
+            "pull": self.pull,
+            "dips": self.dips,
+            "stretch": self.stretch,
+            "hold_force_n": self.force.force,
+            "hold_force_source": self.force.source,
+            "max_force_n": self.max_force,
+            "phases": self.rows(),
+        }
+
+    @property
+    def _fork_in_base(self) -> list[float] | None:
+        if self.base_source is None:
+            return None
+        return [*_plain(self.base.translation), *_plain(quaternion(self.base.rotation))]
+
+    def to_json(self, files: list[Path]) -> str:
+        written = [str(path) for path in files]
+        return json.dumps({**self.content(), "files": written}, indent=2, allow_nan=False)
+
+    def to_text(self, files: list[Path]) -> str:
+        lines = [
+            f"{'phase':<10}{'from':>8}{'to':>8}   {'ends at, frame O':<26}"
+            f"{'in ' + self.frame:<26}{'fingers':>8}{'speed':>8}{'accel.':>8}",
+            f"{'':<10}{'s':>8}{'s':>8}   {'m':<26}{'m':<26}{'m':>8}{'m/s':>8}{'m/s^2':>8}",
+        ]
+        for row in self.rows():
+            fork, base = (" ".join(f"{v:+.4f}" for v in row[k]) for k in ("fork", "base"))
+            lines.append(
+                f"{row['phase']:<10}{row['start_s']:8.3f}{row['end_s']:8.3f}   {fork:<26}{base:<26}"
+                f"{row['opening_m']:8.3f}{row['max_speed_m_s']:8.3f}"
+                f"{row['max_acceleration_m_s2']:8.3f}"
+            )
+        force = self.force
+        if force.force is None:
+            source = force.source
+        else:
+            source = f"{force.force:.1f} N of {self.max_force:g} N ({force.source})"
+        facts = {
+            "hand": f"{' '.join(f'{v:+.4f}' for v in self.hand)} (x y z w in {self.frame})",
+            "fork": f"in {self.frame} by {self.base_source}" if self.base_source else NO_BASE,
+            "middle": self.hanging_source,
+            "pull": f"{self.pull}, with {self.dips} dip{'s' * (self.dips != 1)}",
+            "window": f"grasp to release {self.held_time:.2f} s of {self.most_time:.2f} s",
+            "stretch": f"{self.stretch:.2f} of the rest length",
+            "force": source,
+        }
+        lines += ["", *(f"{name:<10}{value}" for name, value in facts.items())]
+        lines += ["", *(f"wrote {path}" for path in files)]
+        return "\n".join(lines)
+
+    def write(self, folder: Path, rate: float) -> list[Path]:
+        """Write trajectory.csv, waypoints.json, gripper.json and plan.png into a folder.
+
+        Everything is made before the first file is written. Raises UserError.
+        """
+        pose = self.trajectory, self.base, self.hand
+        table = messages.csv_text(*pose, rate)
+        waypoints = messages.trajectory_message(*pose, self.frame)
+        gripper = messages.gripper_commands(self.trajectory, self.gripper.command, self.grip_force)
+        picture = io.BytesIO()
+        messages.draw_picture(self.trajectory, picture)
+        names = ("trajectory.csv", "waypoints.json", "gripper.json", "plan.png")
+        files = [Path(folder, name) for name in names]
+        try:
+            write_text(files[0], table)
+            write_json(files[1], waypoints)
+            write_json(files[2], gripper)
+            with replacing(files[3]) as temporary:
+                temporary.write_bytes(picture.getvalue())
+        except OSError as error:
+            raise UserError(f"{folder}: cannot be written ({error.strerror})") from error
+        return files
+
+
+def with_band(
+    params: Params,
+    name: str | None,
+    mass: float | None = None,
+    diameter: float | None = None,
+    rest_length: float | None = None,
+):
+    """Params and a band's name: of a band that is there, or with sizes of one that is not yet.
+
+    Raises:
+        UserError: Neither a name nor sizes, or both for one band.
+    """
+    if mass is diameter is rest_length is None:
+        if name is None:
+            raise UserError("give --band, or --diameter and --rest-length of a band to come")
+        return params, name
+    if name in params.bands:
+        raise UserError(f"--band {name} brings its sizes from params.yaml: leave the others out")
+    band = band_to_come(params, mass, diameter, rest_length)
+    name = name or "new"
+    return params.model_copy(update={"bands": {**params.bands, name: band}}), name
+
+
+def plan_recording(
+    params: Params,
+    band: str,
+    *,
+    draw: tuple[float, float] | None = None,
+    theta: Path | None = None,
+    recording: Path | None = None,
+    pull: str = INFORMATIVE,
+    precondition: int = 0,
+    pulls: int = 1,
+    root: str | Path = ".",
+    progress: Callable[[str], None] = lambda line: None,
+) -> Plan:
+    """Plan the recording of a band of params.yaml and check it against every limit.
+
+    Where the fork stands in the robot's base is taken from setup.base_to_fork, else from
+    `recording`, else from the band's recordings and episodes; else all is in frame O.
+
+    Args:
+        draw: Drawn position (y, z), frame O [m]; plan.draw if None.
+        theta: θ file that says what holding the draw takes.
+        recording: Earlier one of this rig and of this band, which also tells the force; None: the
+            first of the band's in the project that can be read.
+        pull: INFORMATIVE with plan.dips, PAPER without, DESIGNED with dips that are searched now.
+        precondition: How often the band is stretched to the draw first, in the first grasp.
+        pulls: How many in one recording; between two the hand returns and grasps again.
+        root: Folder of the project.
+        progress: Of a search, a line now and then.
+
+    Raises:
+        UserError: in one line, where a limit is broken or something is not known.
+    """
+    expect_known(params, "band", band)
+    if precondition > MOST_PULLS:
+        raise UserError(f"--precondition: at most {MOST_PULLS}, got {precondition}")
+    if pulls > MOST_PULLS:
+        raise UserError(f"--pulls: at most {MOST_PULLS} in one recording, got {pulls}")
+    setup, band_params = params.setup, params.bands[band]
+    settings = params.plan if draw is None else params.plan.model_copy(update={"draw": draw})
+    earlier = recorded(params, band, recording, root)
+    base, source, frame = _standing(params, band, earlier, root)
+    if source is None and settings.orientation is not None:
+        raise UserError(f"plan.orientation is the hand's in the robot's base: {NO_BASE}")
+    drawn = np.array([0.0, *settings.draw])
+    held = Held.of(band_params, setup)
+    limits.check_draw(setup, held, drawn)
+    given = settings.orientation  # else it looks along the pull at the fork
+    hand = Rotation.from_quat(given) if given else base.rotation * along_pull(drawn)
+    axis = (base.rotation.inv() * hand).apply([0.0, 0.0, 1.0])
+    limits.check_hand(settings, band_params, axis, drawn)
+    prediction = predict(params, band, drawn, theta, earlier)
+
+    dips = settings.dips if pull == INFORMATIVE else ()
+    plan = settings.model_copy(update={"dips": dips})
+    limits.check_dips(plan)
+    trajectory = trajectory_of(plan, setup, params.episode, band_params, axis, pulls, precondition)
+    limits.check_motion(trajectory, plan)
+    limits.check_floor(trajectory, setup, plan)
+    held_time, most_time = limits.check_window(trajectory, plan, params.episode, precondition)
+    limits.check_force(setup, held, drawn, prediction)
+    below = -hanging_middle(settings, setup, band_params)[2]
+    by = "as a string's catenary" if settings.hanging is None else "plan.hanging"
+    return Plan(
+        band=band,
+        trajectory=trajectory,
+        base=base,
+        base_source=source,
+        frame=frame,
+        hand=quaternion(hand),
+        gripper=settings.gripper,
+        stretch=held.stretch(drawn),
+        force=prediction,
+        max_force=setup.max_force,
+        grip_force=setup.grip_force,
+        held_time=held_time,
+        most_time=most_time,
+        hanging_source=f"hangs {below:.3f} m below the tips ({by})",
+        pull=pull,
+        dips=len(dips),
+    )
+
+
+def recorded(
+    params: Params, band: str, recording: Path | None, root: str | Path = "."
+) -> Earlier | None:
+    """What the recording tells, or else the first of the band's in the project that can be read.
+
+    Raises UserError where the one that is given cannot be.
+    """
+    if recording is not None:
+        return read_earlier(recording, params)
+    for path in Layout(Path(root)).recordings(band):
+        with suppress(UserError):
+            return read_earlier(path, params)
+    return None
+
+
+def _standing(
+    params: Params, band: str, earlier: Earlier | None, root: str | Path
+) -> tuple[Transform, str | None, str]:
+    """Frame O to the robot's base, where that came from (None: from nowhere), the base's name."""
+    if earlier is not None:
+        source = earlier.base_source
+        if not source.startswith("setup"):
+            source = f"{source} of {earlier.path}"
+        return earlier.base.inverse(), source, earlier.frame or params.plan.frame
+    try:
+        fork, frame = fork_in_base(params, band, root)
+    except UserError:
+        return Transform.identity(), None, FORK
+    given = params.setup.base_to_fork is not None
+    return fork, "setup.base_to_fork" if given else "the band's first episode", frame
+
+
+def _plain(vector: np.ndarray) -> list[float]:
+    return [round(float(value), 9) + 0.0 for value in vector]

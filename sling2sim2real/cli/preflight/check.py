@@ -1,0 +1,184 @@
+"""What is in a recording, what is missing or wrong, and whether it can be used."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.cli.preflight.facts import (
+    BandFacts,
+    CloudFacts,
+    DelayFacts,
+    ExtrinsicFacts,
+    MotionPhase,
+    SignalSummary,
+)
+from sling2sim2real.cli.preflight.report import CheckReport, Chosen, Topic
+from sling2sim2real.cli.sizes import assumed, band_to_come
+from sling2sim2real.episode.phases import phases_of_hand, unseen
+from sling2sim2real.recording.build import Checked
+from sling2sim2real.recording.checks.finding import Finding
+from sling2sim2real.recording.checks.table import UNDERSTOOD
+from sling2sim2real.recording.coverage import by_phase
+from sling2sim2real.recording.input.bag import sha256
+from sling2sim2real.recording.input.container import Container, read_container
+from sling2sim2real.recording.input.reader import Recording, recording_of
+from sling2sim2real.recording.pulls import Pull, pulls_of
+from sling2sim2real.settings import Params, expect_known
+from sling2sim2real.settings.lab import BandParams
+
+
+@dataclass(frozen=True)
+class Look:
+    """The report, and as much of the recording as could be worked out for those who draw it.
+
+    Attributes:
+        recording: With its stamps corrected where the pull can be used.
+        done: The pull that the report is about, where it can be used.
+        pulls: All of the recording, as far as each goes.
+    """
+
+    report: CheckReport
+    recording: Recording | None = None
+    done: Checked | None = None
+    pulls: Sequence[Checked] = ()
+
+
+@dataclass(frozen=True)
+class GivenBand:
+    """A band as far as whoever checks its recording knows it: where it is from, and its mass."""
+
+    params: BandParams
+    source: str = "given"
+    weighed: bool = True
+
+    @property
+    def facts(self) -> BandFacts:
+        band = self.params
+        mass = float(band.mass) if self.weighed else None
+        return BandFacts(float(band.diameter), float(band.rest_length), self.source, mass)
+
+
+def look_at(
+    path: Path,
+    params: Params,
+    band: GivenBand,
+    pull: int | None = None,
+) -> Look:
+    """Look at a recording as far as it can be read: the report, and what it was made from.
+
+    Args:
+        path: The MCAP file.
+        band: With what is known of it.
+        pull: Which of several; None for the first that can be used, if there is one.
+
+    Raises:
+        UserError: where there is no MCAP file to look at. Anything else is in the report.
+    """
+    container = read_container(Path(path))
+    report = CheckReport(
+        path=str(path),
+        sha256=sha256(path),
+        problem=None,
+        losses=container.losses,
+        notes=container.notes,
+        topics=_topics(container),
+        band=band.facts,
+    )
+    recording = None
+    try:
+        recording = recording_of(container, params.setup, params.episode.delays)
+        report.losses, report.notes = recording.losses, recording.notes
+        _add_roles(report.topics, recording)
+        pulls = pulls_of(Pull.of(recording, params.setup))
+    except UserError as error:
+        report.problem = _without(path, error)
+        report.pulls = [report.row] if recording else []
+        return Look(report, recording)
+    if pull is not None and pull > len(pulls):
+        raise UserError(f"--pull {pull}: the last pull in {path} is number {len(pulls)}")
+    processed = [Checked.of(each, band.params, params, band.weighed) for each in pulls]
+    looks = [_look_at_pull(replace(report), pull_checked) for pull_checked in processed]
+    usable = [look for look in looks if look.report.usable]
+    chosen = looks[pull - 1] if pull else (usable or looks)[0]
+    chosen.report.pulls = [look.report.row for look in looks]
+    return replace(chosen, pulls=processed)
+
+
+def band_of(
+    params: Params,
+    name: str | None = None,
+    mass: float | None = None,
+    diameter: float | None = None,
+    rest_length: float | None = None,
+) -> GivenBand:
+    """The band that a command line names, or one of the sizes that it gives.
+
+    Raises:
+        UserError: about a name that is not known, or a band that does not reach across the fork.
+    """
+    if name is not None:
+        if mass or diameter or rest_length:
+            raise UserError("--band brings its mass, diameter and rest length: leave these out")
+        expect_known(params, "band", name, called="--band")
+        return GivenBand(params.bands[name], f"bands.{name} of params.yaml")
+    taken = assumed(diameter, rest_length)
+    source = f"assumed: {taken}; give yours, or --band" if taken else "given"
+    band = band_to_come(params, mass, diameter, rest_length)
+    return GivenBand(band, source, weighed=mass is not None)
+
+
+def _look_at_pull(report: CheckReport, done: Checked) -> Look:
+    """Fills the report of what the file is with what the pull is."""
+    recording = done.pull.recording
+    report.pull, report.frames = done.pull.number, done.pull.geometry.sources
+    report.delays = DelayFacts.of(done.delays)
+    report.cautions, refusal = done.cautions, done.refusal
+    report.problem = _without(recording.path, refusal) if refusal else None
+    try:
+        report.signals = SignalSummary.of(done)
+        phases = phases_of_hand(done.signals)
+        report.motion = [MotionPhase.of(phase, done.start) for phase in phases]
+        report.keeps_prior = unseen(phases)
+        if refusal and refusal.about == UNDERSTOOD.name:
+            return Look(report, recording)
+        report.cloud = CloudFacts.of(done)
+    except UserError:
+        return Look(report, recording)
+    report.coverage = done.coverage
+    report.phases = by_phase(report.coverage)
+    if done.tips:
+        report.extrinsics = ExtrinsicFacts.of(done.tips, done)
+    return Look(report, recording, done)
+
+
+def _without(path: Path, problem: UserError | Finding) -> str:
+    return str(problem).removeprefix(f"{path}: ")
+
+
+def _topics(container: Container) -> list[Topic]:
+    rows = [Topic(c.topic, c.schema.name, len(c.payloads)) for c in container.channels]
+    return sorted(rows, key=lambda row: row.topic)
+
+
+def _add_roles(topics: list[Topic], recording: Recording) -> None:
+    places = {row.topic: place for place, row in enumerate(topics)}
+    for role, stream in recording.streams.items():
+        place = places[stream.topic]
+        row = topics[place]
+        topics[place] = Chosen(
+            row.topic,
+            row.type,
+            row.messages,
+            role=f"{row.role}, {role}" if row.role else role,
+            why=recording.choices[role],
+            rate=1 / stream.period,
+            longest_gap=stream.longest_gap,
+            missing=stream.missing,
+            lost=stream.lost,
+            delay=stream.receipt_delay,
+            clock_offset=recording.wrench.receipt_delay - stream.receipt_delay,
+            notes=list(stream.notes),
+        )

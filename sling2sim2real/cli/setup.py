@@ -1,0 +1,313 @@
+"""`sling setup`: what a lab measured of itself, checked against itself, into params.yaml.
+
+Tips, camera and floor are measured in the robot's base; `setup:` keeps the fork's frame O in the
+base and in the camera, and its height above the floor. docs/recording.md, Calibration.
+"""
+
+from __future__ import annotations
+
+import math
+from argparse import ArgumentTypeError
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from scipy.spatial.transform import Rotation
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.files import write_text
+from sling2sim2real.cli.arguments import MEASURED
+from sling2sim2real.cli.command_line import say
+from sling2sim2real.cli.params_file import edited
+from sling2sim2real.recording.input.frames import Transform
+from sling2sim2real.recording.loop import SURE, TOUCH, Loop
+from sling2sim2real.settings import load, parse
+from sling2sim2real.settings.lab import SetupParams
+
+UPRIGHT = (0.0, 0.0, 1.0)
+LEVEL = math.radians(2)  # of the line between the tips
+VIEW = math.radians(45)  # from the camera's axis to the fork; lenses see less
+NEAR = 0.05  # m before the camera
+DIGITS = 5  # hundredths of a millimetre
+
+Numbers = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class LabMeasures:
+    """What was measured; None: not.
+
+    Attributes:
+        left_tip, right_tip: In the robot's base [m], as seen from the hand that looks at the fork.
+        fork_width: Between the tips, by a ruler [m].
+        base_to_camera: Pose of the colour camera's optical frame in the base: x y z qx qy qz qw.
+        camera_to_fork: Pose of frame O in that frame, where it was measured there.
+        floor: Height of the floor in the base [m].
+        max_force: That the arm may hold [N].
+        draw_y, draw_z: Box of draws that the arm reaches, frame O [m].
+    """
+
+    left_tip: Numbers | None = None
+    right_tip: Numbers | None = None
+    fork_width: float | None = None
+    base_to_camera: Numbers | None = None
+    camera_to_fork: Numbers | None = None
+    floor: float | None = None
+    max_force: float | None = None
+    draw_y: Numbers | None = None
+    draw_z: Numbers | None = None
+
+    @property
+    def nothing(self) -> bool:
+        return all(value is None for value in vars(self).values())
+
+
+QUESTIONS = {
+    "left_tip": "left tip of the fork in the robot's base, as the hand sees it: x,y,z [m]",
+    "right_tip": "right tip: x,y,z [m]",
+    "fork_width": "distance between the tips by a ruler [m]",
+    "base_to_camera": "colour camera's optical frame in the base: x,y,z,qx,qy,qz,qw",
+    "floor": "height of the floor in the base [m]",
+    "max_force": "force that the arm may hold [N]",
+    "draw_y": "draws that it reaches, along the fork's y: low,high [m]",
+    "draw_z": "and along z: low,high [m]",
+}
+
+
+def requested(answer: Callable[[str], str] = input) -> LabMeasures:
+    """What a user says at a terminal; an empty answer leaves what is there.
+
+    Args:
+        answer: Given a question, gives the line that is typed.
+    """
+    answers: dict[str, Any] = {}
+    say("Enter alone leaves what params.yaml has.")
+    for name, question in QUESTIONS.items():
+        while text := answer(f"{question}: ").strip():
+            try:
+                answers[name] = MEASURED[name][0](text)
+                break
+            except ArgumentTypeError as error:
+                say(f"  {error}")
+    return LabMeasures(**answers)
+
+
+def confirmed(message: str, answer: Callable[[str], str] = input) -> bool:
+    """Whether a user wants this written; Enter alone does."""
+    say(message)
+    return answer("write this into params.yaml? [Y/n] ").strip().lower() in ("", "y", "yes")
+
+
+def set_up(
+    measured: LabMeasures,
+    path: Path | str = "params.yaml",
+    agreed: Callable[[str], bool] = lambda message: True,
+) -> dict:
+    """Check what was measured and write it into `setup:`; comments and order stay.
+
+    Args:
+        agreed: Given what changes, in words, says whether to write it.
+
+    Returns:
+        `changed`: by key, `old` and `new`; `checked`: what agrees, in words; `written`.
+
+    Raises:
+        UserError: It contradicts itself or what is there; nothing is written.
+    """
+    path = Path(path)
+    if measured.nothing:
+        raise UserError(
+            "nothing to set up: give what you measured, such as --left-tip=0.7,0.14,0.42"
+            " --right-tip=0.7,-0.14,0.42, or answer at a terminal"
+        )
+    setup = load(path).setup
+    new, checked = changes_of(measured, setup)
+    old = {key: getattr(setup, key) for key in new}
+    changed = {
+        key: {"old": _plain(old[key]), "new": _plain(value)}
+        for key, value in new.items()
+        if _plain(old[key]) != _plain(value)
+    }
+    text = edited(path.read_text(encoding="utf-8"), lambda content: _put(content["setup"], changed))
+    parse(text, str(path))
+    content = {"changed": changed, "checked": checked, "written": False}
+    if changed and agreed(shown({**content, "written": True})):
+        write_text(path, text)
+        content["written"] = True
+    return content
+
+
+def shown(content: dict) -> str:
+    """What changes, and what was checked, in lines."""
+    lines = [
+        f"setup.{key}: {_text(change['old'])} -> {_text(change['new'])}"
+        for key, change in content["changed"].items()
+    ]
+    if lines and not content["written"]:
+        lines.append("nothing was written")
+    lines = lines or ["nothing changes"]
+    return "\n".join([*lines, *(f"  {line}" for line in content["checked"])])
+
+
+def changes_of(measured: LabMeasures, setup: SetupParams) -> tuple[dict[str, Any], list[str]]:
+    """New values of `setup`, by key, and what agrees, in words. Raises UserError."""
+    new: dict[str, Any] = {}
+    checked: list[str] = []
+    for key in ("fork_width", "max_force", "draw_y", "draw_z"):
+        if getattr(measured, key) is not None:
+            new[key] = getattr(measured, key)
+    width = new.get("fork_width", setup.fork_width)
+    fork = None if setup.base_to_fork is None else Transform.of(setup.base_to_fork)
+    camera = None if measured.base_to_camera is None else Transform.of(measured.base_to_camera)
+    seen = None if measured.camera_to_fork is None else Transform.of(measured.camera_to_fork)
+
+    if (measured.left_tip is None) != (measured.right_tip is None):
+        raise UserError("the fork needs both tips: give --left-tip and --right-tip")
+    if measured.left_tip is not None and measured.right_tip is not None:
+        tips = np.array(measured.left_tip), np.array(measured.right_tip)
+        fork = fork_of(*tips)
+        checked.append(_agreed_width(float(np.linalg.norm(tips[1] - tips[0])), measured, width))
+        _expect_robot_behind(fork)
+        new["base_to_fork"] = _pose(fork)
+    elif camera is not None and seen is not None and fork is None:
+        new["base_to_fork"] = _pose(camera @ seen)
+    elif camera is not None and fork is None:
+        raise UserError(
+            "--base-to-camera: setup.base_to_fork is null, so the camera does not know where the"
+            " fork is: give --left-tip and --right-tip too, or --camera-to-fork"
+        )
+    if camera is not None and seen is not None and fork is not None:
+        loop = Loop.of(fork, seen, camera, width)
+        if not loop.closed:
+            raise UserError(f"{loop}: measure the tips or the camera again")
+        checked.append(f"base, camera and fork agree: {loop}")
+    fork = fork or (camera and seen and camera @ seen)
+    seen = seen or (camera and fork and camera.inverse() @ fork)
+    if seen is not None:
+        checked.append(_looks_at_the_fork(seen))
+        new["camera_to_fork"] = _pose(seen)
+
+    if measured.floor is not None:
+        if fork is None:
+            raise UserError(
+                "--floor: is in the robot's base, in which the fork is not known: give --left-tip"
+                " and --right-tip too, or set setup.fork_height, the tips' height above the floor"
+            )
+        new["fork_height"] = _height(fork, measured.floor)
+    if seen is not None or measured.floor is not None:
+        _expect_above_the_floor(new, setup)
+    return new, checked
+
+
+def fork_of(left: np.ndarray, right: np.ndarray) -> Transform:
+    """Frame O to the robot's base, from the tips there, shape (3,) each; the base stands level.
+
+    Raises UserError where the tips are not level.
+    """
+    way, up = right - left, np.array(UPRIGHT)
+    size = float(np.linalg.norm(way))
+    if size < 0.02:
+        raise UserError("--left-tip and --right-tip are the same place: touch one, then the other")
+    tilt = math.asin(float(way @ up) / size)
+    if abs(tilt) > LEVEL:
+        higher = "right" if tilt > 0 else "left"
+        raise UserError(
+            f"the {higher} tip is {1e3 * abs(way @ up):.0f} mm higher than the other, which tilts"
+            f" the fork by {math.degrees(abs(tilt)):.1f} degrees: level it, or touch the tips again"
+        )
+    x = way / size
+    y = np.cross(up, x) / np.linalg.norm(np.cross(up, x))
+    axes = np.stack([x, y, np.cross(x, y)], axis=1)
+    return Transform(Rotation.from_matrix(axes), (left + right) / 2)
+
+
+def _agreed_width(apart: float, measured: LabMeasures, width: float) -> str:
+    most = SURE * math.sqrt(2) * TOUCH
+    if abs(apart - width) > most:
+        answers = "--fork-width" if measured.fork_width is not None else "setup.fork_width"
+        off = 1e3 * abs(apart - width)
+        raise UserError(
+            f"the tips are {apart:.4f} m apart, {answers} is {width:.4f} m: {off:.1f} mm differ,"
+            f" and touching explains {1e3 * most:.1f}: measure it with a ruler"
+            " (--fork-width), and check the tool centre point"
+        )
+    return f"the tips are {apart:.4f} m apart, and fork_width is {width:.4f} m"
+
+
+def _expect_robot_behind(fork: Transform) -> None:
+    """The hand draws towards the robot: its base lies behind the fork."""
+    ahead = float(fork.inverse().translation[1])
+    if ahead > 0:
+        raise UserError(
+            f"the target would lie behind the robot, whose base is {ahead:.2f} m ahead of the fork:"
+            " left and right are as seen from the hand that looks at the target; swap the tips"
+        )
+
+
+def _looks_at_the_fork(seen: Transform) -> str:
+    """How the camera sees the fork. Raises UserError where it does not."""
+    away, angle = _seen(seen)
+    where = f"{math.degrees(angle):.0f} degrees off"
+    if seen.translation[2] < NEAR or angle > VIEW:
+        back = seen.inverse()
+        inverse = back.translation[2] >= NEAR and _seen(back)[1] <= VIEW
+        hint = "; the inverse pose would: is it the base in the camera?" if inverse else ""
+        raise UserError(
+            f"the camera does not look at the fork, which lies {where}"
+            f" its axis, {away:.2f} m away: give the optical frame's pose (z ahead, x right, y"
+            f" down){hint}"
+        )
+    return f"the fork lies {where} the camera's axis, {away:.2f} m away"
+
+
+def _seen(fork: Transform) -> tuple[float, float]:
+    """Distance [m], and angle from the axis [rad]."""
+    away = float(np.linalg.norm(fork.translation))
+    return away, math.acos(float(fork.translation[2]) / away) if away else 0.0
+
+
+def _height(fork: Transform, floor: float) -> float:
+    height = float(fork.translation[2]) - floor
+    if height < 0.05:
+        where = "above" if height < 0 else f"only {height:.3f} m below"
+        raise UserError(
+            f"--floor {floor:g}: the floor would lie {where} the fork, whose tips are at"
+            f" {fork.translation[2]:.3f} m in the robot's base"
+        )
+    return round(height, DIGITS)
+
+
+def _expect_above_the_floor(new: dict[str, Any], setup: SetupParams) -> None:
+    seen = new.get("camera_to_fork", setup.camera_to_fork)
+    height = new.get("fork_height", setup.fork_height)
+    if seen is not None and (at := float(Transform.of(seen).inverse().translation[2])) < -height:
+        raise UserError(
+            f"the camera would stand {-at - height:.2f} m below the floor: check its pose, and"
+            " setup.fork_height (--floor)"
+        )
+
+
+def _pose(transform: Transform) -> Numbers:
+    return tuple(round(float(value), DIGITS) + 0.0 for value in transform.pose())
+
+
+def _plain(value: object) -> object:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _text(value: object) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(f'{number:g}' for number in value)}]"
+    return "null" if value is None else f"{value:g}"
+
+
+def _put(section: CommentedMap, changed: dict[str, dict]) -> None:
+    for key, change in changed.items():
+        value = change["new"]
+        if isinstance(value, list):
+            value = CommentedSeq(value)
+            value.fa.set_flow_style()
+        section[key] = value

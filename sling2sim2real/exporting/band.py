@@ -1,0 +1,49 @@
+"""What an export asks of a calibrated band, and a planned pull of it."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.episode.planned import planned_pull
+from sling2sim2real.identification.results.mounting import Mounting
+from sling2sim2real.settings import Params
+from sling2sim2real.simulator.initial import hanging_guess
+from sling2sim2real.simulator.launch import Launches
+from sling2sim2real.simulator.model import BandSizes, ClampedBand, LaunchSetup
+from sling2sim2real.simulator.parameters import Parameters
+
+
+class NamedBand(BandSizes, Protocol):
+    """A band's sizes, and what it is called."""
+
+    @property
+    def name(self) -> str: ...
+
+
+class CalibratedBand(Protocol):
+    """A band that can be simulated, as `sling2sim2real.Model` is one."""
+
+    @property
+    def band(self) -> NamedBand: ...
+    @property
+    def parameters(self) -> Parameters: ...
+    @property
+    def mounting(self) -> Mounting | None: ...
+    @property
+    def settings(self) -> Params: ...
+    @property
+    def sling(self) -> ClampedBand: ...
+    @property
+    def launch_setup(self) -> LaunchSetup: ...
+    def launches(self, draws: np.ndarray) -> Launches:
+        """Launch draws (N, 2) [m]."""
+        ...
+
+
+def pull_to(model: CalibratedBand, draw: tuple[float, float]) -> Episode:
+    """A planned pull to a draw (y, z), frame O [m]."""
+    hanging = hanging_guess(model.sling)[model.sling.middle, 2]
+    return planned_pull(model.settings.episode, model.band.name, hanging, draw)

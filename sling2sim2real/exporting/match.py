@@ -1,0 +1,149 @@
+"""Match a chain to the calibrated simulation: the same hold, the same launches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.exporting.band import CalibratedBand
+from sling2sim2real.exporting.chain import MATCHED, SpringChain
+from sling2sim2real.exporting.mujoco_replay import MujocoBand
+from sling2sim2real.exporting.replay import Shot
+from sling2sim2real.simulator.launch import Launches
+
+GRID = 5  # draws along y and z over the box
+AROUND = 1.6  # times nearer and farther than policy.targets: where launches are matched
+LEAST = 4  # of them that must land
+DEPTHS = (0.15, 0.35, 0.55)  # of the box along y, for the proof: none is on the grid
+FINE = 41  # places along z for it
+LOST = 1.0  # relative error of a launch that nothing leaves
+HOLD, LANDING = 0.02, 0.03  # relative errors that weigh as much as each other: what is asked
+STRONGER, SHARE = 0.4, 0.6  # how far a match may go from its guess: logarithm, difference
+TURNS = 12  # of the search, at most
+
+
+@dataclass(frozen=True)
+class DrawCompared:
+    """A draw in both simulations: (calibrated, target's), SI units."""
+
+    draw: tuple[float, float]
+    hold_force: tuple[float, float]
+    speed: tuple[float, float]
+    landing: tuple[float, float]
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Relative errors of the target's values."""
+        pairs = {name: getattr(self, name) for name in ("hold_force", "speed", "landing")}
+        return {name: theirs / ours - 1 for name, (ours, theirs) in pairs.items()}
+
+
+def draws_of(model: CalibratedBand) -> tuple[np.ndarray, Launches]:
+    """Draws (N, 2) of a grid over the box that land around the targets, and their launches.
+
+    Those that the arm may hold. Raises UserError where there are too few.
+    """
+    setup, (near, far) = model.settings.setup, model.settings.policy.targets
+    axes = [np.linspace(*box, GRID) for box in (setup.draw_y, setup.draw_z)]
+    draws = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    done = model.launches(draws)
+    with np.errstate(invalid="ignore"):
+        good = (done.landing_y > near / AROUND) & (done.landing_y < far * AROUND)
+        good &= done.hold_force <= setup.max_force
+    if good.sum() < LEAST:
+        raise UserError(
+            f"{model.band.name}: {good.sum()} of {len(draws)} draws of the box (setup.draw_y, "
+            f"draw_z) land near policy.targets within setup.max_force; a match needs {LEAST}"
+        )
+    return draws[good], done[good]
+
+
+def within_limits(proof: Sequence[DrawCompared]) -> bool:
+    """Whether each draw is held and lands as near as is asked: HOLD, LANDING."""
+    return all(
+        abs(draw.errors["hold_force"]) <= HOLD and abs(draw.errors["landing"]) <= LANDING
+        for draw in proof
+    )
+
+
+def compared(model: CalibratedBand, draws: np.ndarray, shots: list[Shot]) -> list[DrawCompared]:
+    """Shots of draws (N, 2) beside what the calibrated simulation does there."""
+    done = model.launches(draws)
+    return [
+        DrawCompared(
+            draw=(float(draw[0]), float(draw[1])),
+            hold_force=(float(done.hold_force[i]), shot.hold_force),
+            speed=(float(done.speed[i]), shot.speed),
+            landing=(float(done.landing_y[i]), shot.landing),
+        )
+        for i, (draw, shot) in enumerate(zip(draws, shots, strict=True))
+    ]
+
+
+def matched(model: CalibratedBand) -> SpringChain:
+    """The chain whose held forces and landings around the targets are nearest to ours.
+
+    Raises:
+        UserError: MuJoCo is not installed, or too few draws of the box land.
+    """
+    draws, ours = draws_of(model)
+    chain = _fitted(SpringChain.of(model, draws, ours.hold_force), draws, ours)
+    while (step := chain.stable_step) < chain.step:  # it is braked more than was thought
+        chain = _fitted(replace(chain, step=step), draws, ours)
+    return chain
+
+
+def _fitted(start: SpringChain, draws: np.ndarray, ours: Launches) -> SpringChain:
+    """The best chain with the time step of `start`."""
+
+    def chain_at(point: np.ndarray) -> SpringChain:
+        strength, damping = np.exp(point[[0, 2]] - 1)
+        return replace(
+            start,
+            strength=float(start.strength * strength),
+            mooney_share=float(start.mooney_share + point[1] - 1),
+            damping_time=float(start.damping_time * damping),
+        )
+
+    def errors(point: np.ndarray) -> np.ndarray:
+        chain = chain_at(point)
+        shots = MujocoBand(chain).launches(draws)
+        both = [
+            [(shot.hold_force / hold - 1) / HOLD, (shot.landing / landing - 1) / LANDING]
+            for shot, hold, landing in zip(shots, ours.hold_force, ours.landing_y, strict=True)
+        ]
+        return np.nan_to_num(np.ravel(both), nan=LOST / LANDING)
+
+    most = start.most_damping / start.damping_time
+    limits = np.array([[-STRONGER, -SHARE, -np.log(20)], [STRONGER, SHARE, np.log(most)]])
+    solution = least_squares(
+        errors, np.ones(len(MATCHED)), bounds=1 + limits,  # about 1: steps are relative
+        diff_step=1e-2, x_scale=[0.1, 0.1, 1.0], xtol=1e-5, ftol=1e-6, max_nfev=TURNS,
+    )  # fmt: skip
+    return chain_at(solution.x)
+
+
+def proof_draws(model: CalibratedBand) -> np.ndarray:
+    """A draw for each of three targets that no match has seen, shape (3, 2).
+
+    The farther the target, the farther from the fork along y; along z what lands nearest.
+    """
+    setup, targets = model.settings.setup, model.settings.trials.targets
+    wanted = np.linspace(min(targets), max(targets), len(DEPTHS))
+    far, near = sorted(setup.draw_y)
+    low, high = sorted(setup.draw_z)
+    across = np.linspace(low, high, FINE)
+    nearest = []
+    for target, depth in zip(wanted, DEPTHS, strict=True):
+        draws = np.column_stack([np.full(FINE, near + depth * (far - near)), across])
+        miss = np.abs(model.launches(draws).landing_y - target)
+        if np.isnan(miss).all():
+            raise UserError(
+                f"{model.band.name}: no draw at y = {draws[0, 0]:g} m lands, to prove the export"
+            )
+        nearest.append(draws[np.nanargmin(miss)])
+    return np.array(nearest)

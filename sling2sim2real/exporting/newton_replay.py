@@ -1,0 +1,94 @@
+"""Draw, launch and pull the exported band in Newton, with what its files hold alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.metadata import version
+from types import ModuleType
+
+import numpy as np
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.exporting.chain import SpringChain
+from sling2sim2real.exporting.replay import HANG, HandPath, Pulled, Shot
+
+
+def numbers(name: str, chain: SpringChain, draws: np.ndarray) -> dict:
+    """What the JSON file holds; `draws` (N, 2) are for an example."""
+    return {
+        "name": name,
+        "edges": chain.edges,
+        "rest_length_m": chain.rest_length,
+        "mass_kg": chain.mass,
+        "half_width_m": chain.half_width,
+        "floor_m": chain.floor,
+        "projectile_mass_kg": chain.projectile_mass,
+        "arm_stiffness_n_per_m": chain.arm_stiffness,
+        "strength_n": chain.strength,
+        "mooney_share": chain.mooney_share,
+        "upturn": chain.upturn,
+        "damping_time_s": chain.damping_time,
+        "largest_strain": chain.largest_strain,
+        "time_step_s": chain.step,
+        "draws_m": np.asarray(draws).tolist(),
+    }
+
+
+class NewtonReplay:
+    """A chain in Newton. Raises UserError where Newton is not installed.
+
+    Attributes:
+        device: As Warp names it.
+    """
+
+    def __init__(self, chain: SpringChain, device: str = "cpu"):
+        self.chain, self._module, self.device = chain, loader(), device
+        place = "CPU" if device == "cpu" else "GPU"
+        self.engine = f"Newton {version('newton')}, Warp {version('warp-lang')}, {place}"
+        self._numbers = numbers("band", chain, np.empty((0, 2)))
+
+    @property
+    def finer(self) -> NewtonReplay:
+        """The same replay with half the time step."""
+        return NewtonReplay(replace(self.chain, step=self.chain.step / 2), self.device)
+
+    def launches(self, draws: np.ndarray, *, fly: bool = True) -> list[Shot]:
+        """All at once, as ChainReplay.launches; Newton always flies them."""
+        bands = self._module.SpringBands(self._numbers, len(draws), self.device)
+        hold_force = bands.draw(draws)
+        landing, left = bands.launch()
+        speed, angle = np.linalg.norm(left, axis=1), np.arctan2(left[:, 2], left[:, 1])
+        columns = np.stack([landing, speed, angle, hold_force], axis=1)
+        return [Shot(*row) for row in columns.tolist()]
+
+    def pull(self, path: HandPath, times: np.ndarray, stamps: np.ndarray) -> Pulled:
+        """Pull as ChainReplay.pull does."""
+        bands = self._module.SpringBands(self._numbers, device=self.device)
+        middle = self.chain.edges // 2
+        bands.put([self.chain.hanging()], held=False)
+        bands.settle(HANG)
+        bands.put(bands.lines, loaded=False)
+        bands.drive(self._module.STIFF)
+        looks = np.searchsorted(times, stamps)
+        force, lines = np.empty((len(times), 3)), []
+        now, after = bands.states
+        for i, place in enumerate(path(bands.lines[0, middle])):
+            bands.lead(place[None])
+            bands.advance(now, after)
+            now, after = after, now
+            force[i] = bands.force[0]
+            seen = int(np.count_nonzero(looks == i))
+            if seen:
+                lines += [now.particle_q.numpy()[:-1].astype(float)] * seen
+        return Pulled(times, force, np.array(lines))
+
+
+def loader() -> ModuleType:
+    """sling2sim2real.exporting.newton_band. Raises UserError where Newton is not installed."""
+    try:
+        from sling2sim2real.exporting import newton_band
+    except ImportError as error:
+        raise UserError(
+            "newton is not installed: pip install -e '.[export]' -c constraints.txt"
+        ) from error
+    return newton_band

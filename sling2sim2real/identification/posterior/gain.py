@@ -1,0 +1,137 @@
+"""Gain of knowing more: how much the interval of a landing would narrow.
+
+Near the mode a landing is linear in what is not known, which is Gaussian: both as the samples of
+the posterior have them. A launch, another pull, or knowing some parameters exactly then changes
+the covariance by plain algebra.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sling2sim2real.identification.posterior.coordinates import PRIORS
+
+LOGS = "youngs_modulus", "elasticity_damping", "returned_share"  # whose logarithms are Gaussian
+HALF_NORMAL = 1 - 2 / np.pi  # its variance, of a normal's
+HALF = "air_drag", "softening", "flow"  # are not below 0
+LEAST = 1e-9  # of a column that the samples vary
+
+
+@dataclass(frozen=True)
+class LandingModel:
+    """T landings of D unknowns.
+
+    Attributes:
+        names: Of the unknowns, length D.
+        covariance: Of the unknowns, shape (D, D).
+        gradient: Of the landings in the unknowns [m], shape (T, D).
+        draw: Standard deviation of the landings by the draw's error [m], shape (T,).
+        half_width: Of the landings' intervals [m], shape (T,).
+    """
+
+    names: list[str]
+    covariance: np.ndarray
+    gradient: np.ndarray
+    draw: np.ndarray
+    half_width: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        names: Sequence[str],
+        samples: np.ndarray,
+        chosen: np.ndarray,
+        landings: np.ndarray,
+        draw: np.ndarray,
+        half_width: np.ndarray,
+    ) -> LandingModel | None:
+        """Fit the model to samples (M, P) of θ and the landings (T, S) of some of them.
+
+        None without unknowns, with a half width that is not finite, or with too few landings.
+
+        Args:
+            names: Of the columns of `samples`.
+            chosen: Numbers of the samples that landed there, shape (S,).
+            draw, half_width: As the attributes.
+        """
+        good = np.isfinite(landings).all(axis=0)
+        unknown = unknowns(names, samples)
+        if not unknown or not np.isfinite(half_width).all() or good.sum() < 2 * len(unknown):
+            return None
+        columns = np.stack(list(unknown.values()), axis=1)
+        some = chosen[good]
+        design = np.column_stack([np.ones(len(some)), columns[some] - columns.mean(axis=0)])
+        gradient = np.linalg.lstsq(design, landings[:, good].T, rcond=None)[0][1:].T
+        covariance = np.atleast_2d(np.cov(columns.T))
+        return cls(list(unknown), covariance, gradient, draw, half_width)
+
+    def after(self, covariance: np.ndarray | None = None, draw: float = 1.0) -> np.ndarray:
+        """Half widths [m], shape (T,), with another covariance and a share of the draw's error."""
+        now, then = (
+            np.einsum("td,de,te->t", self.gradient, covariance_t, self.gradient)
+            + (share * self.draw) ** 2
+            for covariance_t, share in (
+                (self.covariance, 1.0),
+                (self.covariance if covariance is None else covariance, draw),
+            )
+        )
+        return self.half_width * np.sqrt(then / now)
+
+    def launched(self, aim: int, tape: float, count: int = 1) -> np.ndarray:
+        """Covariance after `count` launches at one of the targets were measured to `tape` [m]."""
+        slope = self.gradient[aim]
+        noise = (self.draw[aim] ** 2 + tape**2) / count
+        explained = self.covariance @ slope
+        return self.covariance - np.outer(explained, explained) / (slope @ explained + noise)
+
+    def exact(self, names: Collection[str]) -> np.ndarray:
+        """Covariance if these unknowns were known exactly."""
+        which = [self.names.index(name) for name in names if name in self.names]
+        explained = self.covariance[:, which]
+        return self.covariance - explained @ np.linalg.solve(explained[which], explained.T)
+
+    def explained(self, name: str, spread: float) -> np.ndarray:
+        """Covariance after an unknown was measured to a standard deviation."""
+        place = self.names.index(name)
+        explained = self.covariance[:, place]
+        return self.covariance - np.outer(explained, explained) / (explained[place] + spread**2)
+
+    def pulled(self, pulls: int = 1) -> np.ndarray:
+        """Covariance after another pull that tells as much as each of the `pulls` did."""
+        prior = self._prior()
+        values, vectors = np.linalg.eigh(np.linalg.inv(self.covariance) - prior)
+        explained = (vectors * np.maximum(values, 0)) @ vectors.T
+        return np.linalg.inv(np.linalg.inv(self.covariance) + explained / pulls)
+
+    def _prior(self) -> np.ndarray:
+        """Precision (D, D) of what is known without any pull; a bound tells as its own spread."""
+        precision, place = np.zeros_like(self.covariance), self.names.index
+        # of the coordinates' priors in the unknowns
+        directions = {name: {name: 1.0} for name in PRIORS} | {
+            "log_loss_factor": {"elasticity_damping": 1.0, "youngs_modulus": 0.5},
+            "log_returned_share": {"returned_share": 1.0},
+        }
+        for name, parts in directions.items():
+            if not set(parts) <= set(self.names):
+                continue
+            direction = np.zeros(len(self.names))
+            for part, weight in parts.items():
+                direction[place(part)] = weight
+            variance = PRIORS[name][1] ** 2 * (HALF_NORMAL if name in HALF else 1.0)
+            precision += np.outer(direction, direction) / variance
+        if "turn_damping" in self.names:  # even between 0 and 1
+            precision[place("turn_damping"), place("turn_damping")] += 12.0
+        return precision
+
+
+def unknowns(names: Sequence[str], samples: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns (M,) of samples (M, P) that vary, as they are Gaussian."""
+    columns = {}
+    for name, column in zip(names, samples.T, strict=True):
+        column = np.log(column) if name in LOGS else column
+        if len(column) and np.ptp(column) > LEAST:
+            columns[name] = column
+    return columns

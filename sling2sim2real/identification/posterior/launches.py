@@ -1,0 +1,203 @@
+"""The evidence of launches that a user measured: where the projectile landed from a draw.
+
+    -2 log p = sum over launches of ((log y - log f(phi, draw)) / sigma)^2
+
+f is the simulated landing. sigma is each launch's own: what the error of its draw moves the
+landing by, and the tape measure's. What the law gets wrong is common to a band's launches: that is
+the returned share, a coordinate of the density.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.launch_table import DRAW, LANDING, metres
+from sling2sim2real.simulator.launch import landing_gradient, launch
+from sling2sim2real.simulator.model import ClampedBand, LaunchSetup
+from sling2sim2real.simulator.parameters import Parameters
+
+TAPE = 0.01  # of a measured landing, standard deviation [m]
+
+
+@dataclass(frozen=True)
+class Observed:
+    """A launch: draw (y, z) and its standard deviation along each axis, landing [m].
+
+    The deviation is None where a table leaves it out. Raises UserError: a value that none has.
+    """
+
+    draw: tuple[float, float]
+    error: float | None
+    landing: float
+
+    def __post_init__(self) -> None:
+        for name, value in zip((*DRAW, LANDING), (*self.draw, self.landing), strict=True):
+            metres("launch", name, str(value))
+        if self.error is not None and not 0 <= self.error < 1:
+            raise UserError(f"error: must be from 0 to 1 m, got {self.error}")
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Launches of one band, and what launches them.
+
+    Attributes:
+        made_with: The settings that `setup` comes from, by their keys in params.yaml.
+    """
+
+    launches: Sequence[Observed]
+    setup: LaunchSetup
+    made_with: Mapping[str, float | None] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class LaunchExpansion:
+    """-2 log p of N launches around coordinates (D,).
+
+    Attributes:
+        left: Of each, log of measured over simulated landing; NaN where the simulated launch
+            fails, or one from a draw beside it, shape (N,).
+        spread: Standard deviation of that logarithm, shape (N,).
+        design: Change of `left` with the coordinates, over the spread, shape (D, N); 0 where a
+            launch fails, and in a coordinate whose finite difference fails.
+    """
+
+    left: np.ndarray
+    spread: np.ndarray
+    design: np.ndarray
+
+    @property
+    def failed(self) -> np.ndarray:
+        """Which launches fail, shape (N,); they count in nothing else here."""
+        return np.isnan(self.left)
+
+    @property
+    def gap(self) -> np.ndarray:
+        """`left` over the spread, shape (N,)."""
+        return self.left / self.spread
+
+    @property
+    def misfit(self) -> float:
+        gap = self.gap[~self.failed]
+        return float(gap @ gap)
+
+    @property
+    def hessian(self) -> np.ndarray:
+        """As of an `Expansion`, shape (D, D)."""
+        design = self.design[:, ~self.failed]
+        return design @ design.T
+
+    @property
+    def gradient(self) -> np.ndarray:
+        """As of an `Expansion`, shape (D,)."""
+        return self.design[:, ~self.failed] @ self.gap[~self.failed]
+
+
+class LaunchLikelihood:
+    """Launches of one band.
+
+    Attributes:
+        setup: With the history that the first launch had.
+        deepest: What the band had seen before each launch [m], of a law with memory, shape (N,): as
+            the history says, or an earlier launch. Rubber softens up to its largest stretch.
+        after: The same after all of them.
+    """
+
+    def __init__(
+        self,
+        observed: Sequence[Observed],
+        sling: ClampedBand,
+        setup: LaunchSetup,
+        workers: int = 1,
+    ) -> None:
+        """Keep the launches; `workers` are threads, which change no result."""
+        self.sling, self.setup, self.workers = sling, setup, workers
+        self.draws = np.array([launched.draw for launched in observed], float).reshape(-1, 2)
+        self.errors = np.array([launched.error for launched in observed], float)
+        self.landings = np.array([launched.landing for launched in observed], float)
+        first = setup.history.deepest if setup.history else 0.0
+        seen = np.maximum.accumulate(np.append(first, np.linalg.norm(self.draws, axis=1)))
+        self.deepest, self.after = seen[:-1], float(seen[-1])
+
+    def expand(
+        self, parameters_of: Callable[[np.ndarray], Parameters], phi: np.ndarray, steps: np.ndarray
+    ) -> LaunchExpansion:
+        """Expand around coordinates (D,) with finite differences `steps` (D,)."""
+        around = parameters_of(phi + np.vstack([0 * steps, np.diag(steps)]))
+        number = np.arange(len(self.draws))
+        here, gradient = landing_gradient(
+            lambda draws: self._simulated(
+                around[:1], draws, number.repeat(len(draws) // len(number))
+            ),
+            self.draws,
+        )
+        slope = np.linalg.norm(gradient, axis=1)
+        count = len(steps)
+        moved = self._simulated(
+            around[np.repeat(1 + np.arange(count), len(self.draws))],
+            np.tile(self.draws, (count, 1)),
+            np.tile(number, count),
+        ).reshape(count, -1)
+        left = np.log(self.landings / here)
+        changes = (np.log(moved) - np.log(here)) / steps[:, None]  # (D, N)
+        spread = np.hypot(slope * self.errors / here, TAPE / self.landings)
+        design = changes / spread
+        left[~np.isfinite(left / spread)] = np.nan
+        design[~np.isfinite(design)] = 0.0
+        return LaunchExpansion(left, spread, design)
+
+    def remaining(self, parameters: Parameters, expansion: LaunchExpansion) -> np.ndarray:
+        """Logs of measured over simulated landings of M parameters, over the spread: (M, N).
+
+        NaN where a simulation fails; of the launches that do not fail at the expansion.
+        """
+        good = np.flatnonzero(~expansion.failed)
+        count = len(parameters)
+        number = np.tile(good, count)
+        each = parameters[np.repeat(np.arange(count), len(good))]
+        landed = self._simulated(each, self.draws[number], number).reshape(count, -1)
+        return np.log(self.landings[good] / landed) / expansion.spread[good]
+
+    def _simulated(
+        self, parameters: Parameters, draws: np.ndarray, number: np.ndarray
+    ) -> np.ndarray:
+        """Landings [m] of N parameters from draws (N, 2), NaN where a launch fails.
+
+        Args:
+            number: Of the launch whose history each has, shape (N,).
+        """
+        setup, history = self.setup, self.setup.history
+        if history:
+            setup = replace(setup, history=replace(history, deepest=self.deepest[number]))
+        done = launch(self.sling, setup, parameters, draws, workers=self.workers)
+        failed = np.array([why is not None for why in done.failure])
+        return np.where(failed, np.nan, done.landing_y)
+
+
+def without_each(
+    launches: LaunchExpansion, hessian: np.ndarray, gradient: np.ndarray, widened: float = 1.0
+) -> np.ndarray:
+    """How unlikely each launch is by all other evidence, as a standard score (leave-one-out).
+
+    By the density's quadratic at its mode: without launch i the precision is H - d d' and the
+    gradient g - d gap, d its column of `design`.
+
+    Args:
+        hessian, gradient: Of the whole density at its mode, shapes (D, D) and (D,).
+        widened: By what the density's standard deviations are multiplied.
+
+    Returns:
+        Shape (N,); positive where it landed further than predicted, NaN for a launch that fails.
+    """
+    scores = np.full(len(launches.gap), np.nan)
+    for i in np.flatnonzero(~launches.failed):
+        gap, slope = launches.gap[i], launches.design[:, i]
+        rest = hessian - np.outer(slope, slope)
+        left = gap - slope @ np.linalg.solve(rest, gradient - slope * gap)
+        variance = 1 + widened**2 * slope @ np.linalg.solve(rest, slope)
+        scores[i] = left / np.sqrt(variance)
+    return scores

@@ -1,0 +1,323 @@
+"""The evidence of one recording: residuals over their spread, and its own nuisances, eliminated.
+
+    -2 log p(recording | phi) = min over n of |r(phi, n) / sigma|^2 + |n / tolerance|^2
+
+Nuisances n are what a recording leaves open of its instruments, Gaussian, each recording's own.
+Release and the hand's offset along the pull are simulated, and what another camera's clock sees is
+taken from the same rollouts; bias, drift and gain of the force, its clock against the pose's, the
+extrinsics and the stamp of each picture act linearly on the measured side. For Gaussians the
+minimum over n is, up to a constant, the integral over n.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.identification.posterior.alignment import recoil_seen
+from sling2sim2real.identification.posterior.coordinates import LOSS
+from sling2sim2real.identification.posterior.expansion import Expansion, NuisanceProjection
+from sling2sim2real.identification.posterior.residuals import Residuals, Rule
+from sling2sim2real.simulator.interaction import Rollouts, interact
+from sling2sim2real.simulator.model import ClampedBand
+from sling2sim2real.simulator.parameters import Parameters
+
+SIMULATED = "release", "camera", "hand"
+RELEASE_ERROR = 3e-5  # s: of the release, where the clocks are known by it
+NUDGE = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Standard deviations of the residuals and of what the recording leaves open.
+
+    Attributes:
+        force: Of a sample of the force [N]. Its low-pass repeats a sample's error in some 14, and
+            so does what the law gets wrong of the pull: 30 mN each are worth 30 sqrt(14) alone.
+        cloud, way: Of a bin of a picture [m], and of the recoil as a share of the way gone.
+        release, camera: Of the release and of the camera's clock against the force's [s]. A camera
+            whose clock is known by the release has all of it.
+        hand: Of the hand's place along the pull [m].
+        jitter: Of one picture's stamp [s].
+        shift, turn: Of the camera's extrinsics [m], [rad].
+        bias, drift: Of the tared force, and over the pull [N].
+        gain: Of the force sensor: datasheets have 1 to 1.5 % of full scale in 95 of 100 cases.
+        pose: Of the pose's clock against the force's [s].
+    """
+
+    force: float = 0.11
+    cloud: float = 1.0e-3
+    way: float = 0.02
+    release: float = 3e-4
+    camera: float = 1e-3
+    hand: float = 1e-5
+    jitter: float = 3e-4
+    shift: float = 2e-3
+    turn: float = 3e-3
+    bias: float = 0.02
+    drift: float = 0.02
+    gain: float = 6e-3
+    pose: float = 5e-4
+
+    @classmethod
+    def of(cls, episode: Episode) -> Tolerances:
+        """Read the tolerances from an episode's metadata; the usual ones where it says nothing."""
+        preprocessing = episode.metadata.get("preprocessing", {})
+        delays = preprocessing.get("delays") or {}
+        clocks = {name: delays.get(name) or {} for name in ("camera", "pose")}
+        given = {name: clock.get("left") or clock.get("error") for name, clock in clocks.items()}
+        given["release"] = preprocessing.get("release_error")
+        if given["camera"] and clocks["camera"].get("against", "pose") == "pose":
+            given["camera"] = np.hypot(given["camera"], given["pose"] or 0.0)
+            if clocks["pose"].get("against") == "release":  # and so is the camera's, by the pose
+                given["pose"] = np.hypot(given["pose"] or 0.0, given["release"] or 0.0)
+                given["release"] = RELEASE_ERROR
+        return cls(**{name: float(value) for name, value in given.items() if value})
+
+    @property
+    def simulated(self) -> np.ndarray:
+        return np.array([self.release, self.camera, self.hand])
+
+
+def opening_time(episode: Episode, sling: ClampedBand, friction: float) -> float:
+    """Time in which the simulated pads must open for the force to fall as fast as recorded [s].
+
+    From the slip on friction falls with the pads' force, which is gone after the opening time: the
+    held force is gone sooner, by its share of the friction of closed pads. An episode that does
+    not say how fast its force fell has the lab's own.
+    """
+    fall = episode.metadata.get("preprocessing", {}).get("release_fall")
+    if not fall:
+        return sling.finger_opening_time
+    late = np.flatnonzero(episode.time < episode.release_time)[-20:]
+    held = np.linalg.norm(episode.force[late], axis=1).max()
+    return float(np.clip(fall * 2 * friction * sling.grip_force / held, 5e-4, 0.05))
+
+
+def _picture_count(episode: Episode) -> int:
+    """How many of the first pictures hold all that count."""
+    return max(Rule().pictures(episode), default=-1) + 1
+
+
+class Failed(Exception):
+    """A simulation did not reach its end."""
+
+
+class Likelihood:
+    """Likelihood of the parameters of a band, by one recording.
+
+    Attributes:
+        episode, cutoff: As given.
+        sling: As given, with the pads' opening time of this episode.
+        tolerances: By the episode's metadata, until `with_wider_tolerances`.
+        moved: What was added to the camera's stamps before the fit [s].
+    """
+
+    def __init__(
+        self, episode: Episode, sling: ClampedBand, cutoff: float, friction: float
+    ) -> None:
+        """`friction` is what the method fixes, of the pads."""
+        self.episode, self.cutoff = episode, cutoff
+        self.sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
+        self.tolerances, self.moved = Tolerances.of(episode), 0.0
+        end = np.searchsorted(episode.time, episode.release_time)
+        place = episode.position[max(end - 5, 0) : end].mean(axis=0)
+        self._away = place / np.linalg.norm(place)
+        self._picture_count = _picture_count(episode)
+
+    def aligned(self, parameters: Parameters) -> Likelihood:
+        """Set the camera's clock, in a copy, to where these parameters show the recoil best.
+
+        `parameters` are one sample. Where no other clock shows it clearly better, the likelihood
+        itself is returned. A fit that starts a picture away can end in another minimum: a picture
+        from before the release does not change with the camera's clock. Raises Failed.
+        """
+        best = recoil_seen(self.episode, self.tolerances.camera, parameters, self.sling)
+        if best is None:
+            return self
+        moved = copy(self)
+        moved.moved = best
+        moved.episode = replace(self.episode, cloud_time=self.episode.cloud_time + best)
+        moved._picture_count = _picture_count(moved.episode)
+        return moved
+
+    def with_wider_tolerances(self, expansion: Expansion) -> Likelihood:
+        """Copy with force and recoil as sure as the law can follow them.
+
+        Their tolerances are what a fit left of them, where that is more.
+        """
+        wider = copy(self)
+        force = max(self.tolerances.force, expansion.discrepancy)
+        way = max(self.tolerances.way, expansion.recoil_discrepancy)
+        wider.tolerances = replace(self.tolerances, force=force, way=way)
+        return wider
+
+    def shifted(self, nuisances: np.ndarray) -> Episode:
+        """The episode with another release, camera's clock and place of the hand, (3,).
+
+        Without the pictures that count nowhere.
+        """
+        release, camera, hand = nuisances
+        return replace(
+            self.episode,
+            release_time=self.episode.release_time + release,
+            cloud_time=self.episode.cloud_time[: self._picture_count] + camera,
+            position=self.episode.position + hand * self._away,
+        )
+
+    def simulate(
+        self, parameters: Parameters, nuisances: np.ndarray, late: Sequence[float] = (0.0,)
+    ) -> list[Rollouts]:
+        """Rollouts of N parameters, as pictures show them that are so late [s]. Raises Failed.
+
+        They end with the last picture that counts.
+        """
+        episode = self.shifted(nuisances)
+        stamps = [episode.cloud_time + delay for delay in late]
+        every, places = np.unique(np.concatenate(stamps), return_inverse=True)
+        seen = replace(episode, cloud_time=every)
+        done = interact(self.sling, seen, parameters, until=max(every, default=np.inf))
+        if why := next((reason for reason in done.failure if reason), None):
+            raise Failed(why)
+        return [
+            replace(done, cloud_time=times, center_line=done.center_line[:, where])
+            for times, where in zip(stamps, np.split(places, len(stamps)), strict=True)
+        ]
+
+    def expand(
+        self,
+        parameters_of: Callable[[np.ndarray], Parameters],
+        phi: np.ndarray,
+        steps: np.ndarray,
+        nuisances: np.ndarray,
+        pool: Executor,
+        residuals: Residuals | None = None,
+    ) -> Expansion:
+        """Expand around coordinates (D,) with finite differences `steps` (D,). Raises Failed.
+
+        Args:
+            parameters_of: Of coordinates (N, D), as `Coordinates.parameters`.
+            pool: Maps over batches of rollouts.
+            residuals: Whose bins are taken; None: bins of the rollout there.
+        """
+        around = parameters_of(phi + np.vstack([0 * steps, np.diag(steps)]))
+        release, _, hand = np.diag(NUDGE)
+        jobs = [
+            (around, nuisances, (0.0, NUDGE[1])),
+            (around[:1], nuisances + release),
+            (around[:1], nuisances + hand),
+        ]
+        (first, later), (released,), (led,) = pool.map(lambda job: self.simulate(*job), jobs)
+        later = replace(later, force=later.force[:1], center_line=later.center_line[:1])
+        residuals = residuals or Residuals(
+            self.episode, self.sling, self.cutoff, first.center_line[0]
+        )
+        vectors = residuals(first)
+        moved = np.concatenate([residuals(rollouts) for rollouts in (released, later, led)])
+        gap = vectors[0]
+        slopes = (vectors[1:] - gap) / steps[:, None]
+        # The force tells nothing of the loss factor, the recoil does: a law that lacks slow
+        # hysteresis would take the one for the other.
+        uncounted = slopes[LOSS].copy()
+        uncounted[3 * len(residuals.samples) :] = 0.0
+        slopes[LOSS] -= uncounted
+        nuisance_slopes = (moved - gap) / NUDGE[:, None]
+        expansion = self._eliminated(residuals, gap, slopes, nuisance_slopes, nuisances)
+        return replace(expansion, uncounted=uncounted)
+
+    def remaining(
+        self,
+        parameters: Parameters,
+        expansion: Expansion,
+        nuisances: np.ndarray,
+        loss: np.ndarray,
+        workers: int,
+    ) -> np.ndarray:
+        """What nuisances leave of the residuals of N parameters, NaN where a simulation fails.
+
+        Its squares add up to -2 log p, in the bins of an expansion and with the nuisances' effects
+        there.
+
+        Args:
+            nuisances: Where the expansion was made, shape (3,).
+            loss: Changes of the logarithm of the loss factor since, shape (N,).
+
+        Returns:
+            Shape (N, R + K).
+        """
+        seen = self.shifted(nuisances)
+        until = max(seen.cloud_time, default=np.inf)
+        done = interact(self.sling, seen, parameters, until=until, workers=workers)
+        residuals = expansion.residuals(done) - np.outer(loss, expansion.uncounted)
+        left = expansion.elimination(residuals)
+        left[[why is not None for why in done.failure]] = np.nan
+        return left
+
+    def _eliminated(
+        self,
+        residuals: Residuals,
+        gap: np.ndarray,
+        slopes: np.ndarray,
+        nuisance_slopes: np.ndarray,
+        nuisances: np.ndarray,
+    ) -> Expansion:
+        """Eliminate the nuisances n: a Schur complement of the Gauss-Newton matrix.
+
+        Columns of the Jacobian J, over the residuals' spread: D of phi, three of the simulated n,
+        M of the linear n. With the precisions of n's priors on the diagonal,
+
+            J' J = [A  B]      hessian = A - B C^-1 B'      best n = C^-1 (c - B' d)
+                   [B' C]      gradient = a - B C^-1 c
+
+        with (a, c) = J' times what is left of the residuals. In `misfit` the linear n are at their
+        best, and the simulated ones where the rollout was made.
+        """
+        tolerances = self.tolerances
+        linear = self._linear(residuals, gap, nuisance_slopes[SIMULATED.index("camera")])
+        # Of the camera's clock `moved` was taken beforehand, and belongs to what its prior judges.
+        nuisances = nuisances + self.moved * (np.array(SIMULATED) == "camera")
+        weight = 1 / residuals.spread(tolerances.force, tolerances.cloud, tolerances.way)
+        of_phi, simulated = len(slopes), len(SIMULATED)
+        design = np.concatenate([slopes, nuisance_slopes, linear]) * weight  # (D + 3 + M, R)
+        left = -gap * weight
+        gram, right = design @ design.T, design @ left
+        every_nuisance = slice(of_phi, None)
+        sizes = np.append(tolerances.simulated, np.ones(len(linear)))  # of the nuisances' priors
+        priors = np.append(nuisances / tolerances.simulated, np.zeros(len(linear)))
+        gram[every_nuisance, every_nuisance] += np.diag(sizes**-2)
+        right[every_nuisance] -= priors / sizes
+        m = slice(of_phi + simulated, None)  # linear
+        cost = left @ left + priors @ priors
+        best_linear = np.linalg.solve(gram[m, m], right[m])
+        inverse = np.linalg.inv(gram[every_nuisance, every_nuisance])  # C^-1
+        effects = np.vstack([design[every_nuisance].T, np.diag(1 / sizes)])
+        coupling = gram[:of_phi, every_nuisance]  # B
+        best, change = inverse @ right[every_nuisance], -inverse @ gram[every_nuisance, :of_phi]
+        return Expansion(
+            misfit=float(cost - right[m] @ best_linear),
+            hessian=gram[:of_phi, :of_phi] + coupling @ change,
+            gradient=right[:of_phi] - coupling @ best,
+            nuisances=(best[:simulated], change[:simulated]),
+            spread=np.sqrt(np.diag(inverse)[:simulated]),
+            residuals=residuals,
+            left=(left - best_linear @ design[m]) / weight,
+            elimination=NuisanceProjection(weight, priors, np.linalg.qr(effects)[0]),
+            uncounted=np.zeros(len(left)),
+        )
+
+    def _linear(self, residuals: Residuals, gap: np.ndarray, camera: np.ndarray) -> np.ndarray:
+        """Columns of the linear nuisances, each in units of its tolerance, shape (M, R)."""
+        has, changes = self.tolerances, residuals.columns(gap)
+        sizes = {"force_bias": has.bias, "force_drift": has.drift}
+        sizes |= {"force_gain": has.gain, "force_late": has.pose}
+        sizes |= {"cloud_shift": has.shift, "cloud_turn": has.turn}
+        columns = [sizes[re.sub("_[xyz]$", "", name)] * change for name, change in changes.items()]
+        for picture in np.unique(residuals.picture[residuals.recoils]):
+            columns.append(has.jitter * np.where(residuals.of_picture(picture), camera, 0.0))
+        return np.array(columns)

@@ -1,0 +1,134 @@
+"""Everything that a search evaluated, one row a parameter vector, and the best of it.
+
+Columns: method, phase (de, cma, bo, ...), generation, solver (null unless several run side by
+side), unit_<name> and <name> (physical) of each axis, geom, force, work, total, failure. A failed
+row has total = +inf, NaN terms and the reason.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.files import read_table, replacing
+from sling2sim2real.identification.objective.evaluate import Evaluation
+from sling2sim2real.identification.objective.loss import TERMS
+from sling2sim2real.settings.identification import LEAST_SQUARES
+from sling2sim2real.simulator.parameters import Parameters
+
+
+@dataclass
+class Evaluations:
+    """Rows in the order in which they were evaluated."""
+
+    method: str
+    names: tuple[str, ...]
+    _parts: list[pa.Table] = field(default_factory=list)
+
+    def add(
+        self,
+        evaluation: Evaluation,
+        *,
+        phase: str,
+        generation: int,
+        solver: np.ndarray | None = None,
+    ) -> None:
+        """Append a batch; `solver` says who asked for each point, shape (N,)."""
+        count = len(evaluation.total)
+        columns = {
+            "method": pa.array([self.method] * count, pa.string()),
+            "phase": pa.array([phase] * count, pa.string()),
+            "generation": pa.array([generation] * count, pa.int32()),
+            "solver": pa.array([None] * count if solver is None else solver, pa.int32()),
+        }
+        for prefix, values in (("unit_", evaluation.unit), ("", evaluation.theta)):
+            for name, column in zip(self.names, values.T, strict=True):
+                columns[prefix + name] = pa.array(column, pa.float64())
+        for name in TERMS:
+            columns[name] = pa.array(evaluation.terms[name], pa.float64())
+        columns["total"] = pa.array(evaluation.total, pa.float64())
+        columns["failure"] = pa.array(evaluation.failure, pa.string())
+        self._parts.append(pa.table(columns))
+
+    @property
+    def table(self) -> pa.Table:
+        if not self._parts:  # the columns of no rows
+            points, values = np.zeros((0, len(self.names))), np.zeros(0)
+            nothing = Evaluation(points, points, dict.fromkeys(TERMS, values), values, [])
+            self.add(nothing, phase="", generation=0)
+        return pa.concat_tables(self._parts).combine_chunks()
+
+    @property
+    def unit(self) -> np.ndarray:
+        """Shape (N, D)."""
+        return np.stack([self.table[f"unit_{name}"].to_numpy() for name in self.names], axis=1)
+
+    @property
+    def total(self) -> np.ndarray:
+        """Shape (N,); +inf where failed."""
+        return self.table["total"].to_numpy()
+
+    def save(self, path: Path) -> None:
+        with replacing(path) as temporary:
+            pq.write_table(self.table, temporary)
+
+    @classmethod
+    def load(cls, method: str, names: tuple[str, ...], *paths: Path) -> Evaluations:
+        """Read files that `save` wrote, one after the other."""
+        return cls(method, names, [read_table(path) for path in paths])
+
+    def followed_by(self, other: Evaluations) -> Evaluations:
+        """These rows, then those of `other`."""
+        return Evaluations(self.method, self.names, [self.table, other.table])
+
+    def of_phase(self, phase: str) -> Evaluations:
+        """The rows of one phase alone."""
+        table = self.table
+        chosen = pa.array(table["phase"].to_numpy() == phase)
+        return Evaluations(self.method, self.names, [table.filter(chosen)])
+
+    def best_parameters(self, law: str) -> Parameters:
+        """One sample, of the best row. Raises UserError as `best_row`."""
+        best = self.best_row()
+        return Parameters.named(law, {name: best[name] for name in self.names})
+
+    def best_row(self) -> dict:
+        """The row with the least total; among equals the first. Raises UserError if all failed."""
+        total = self.total
+        if not np.isfinite(total).any():
+            reasons = sorted(set(self.table["failure"].to_pylist()))
+            raise UserError(
+                f"{self.method}: each of {len(total)} simulations failed ({'; '.join(reasons)});"
+                " check the recording, and the box under `parameters` in params.yaml"
+            )
+        return self.table.slice(int(np.argmin(total)), 1).to_pylist()[0]
+
+
+def theta_content(evaluations: Evaluations, band: str, entries: dict) -> dict:
+    """What a θ file holds: the mode of a density where one was fitted, else the best evaluation.
+
+    Args:
+        evaluations: Everything that a search evaluated; a density's mode is a phase of its own.
+        entries: What else the search says of θ (identify/results/confidence_file.py).
+    """
+    mode = evaluations.of_phase(LEAST_SQUARES)
+    chosen = mode if len(mode.total) else evaluations
+    best = chosen.best_row()
+    terms = {name: best[name] for name in (*TERMS, "total") if np.isfinite(best[name])}
+    return {
+        "band": band,
+        "method": chosen.method,
+        "theta": {name: best[name] for name in chosen.names},
+        "nuisances": {},
+        "loss": terms,
+        "rollouts": len(chosen.total),
+        "failed": int(np.isinf(chosen.total).sum()),
+        "found": {name: best[name] for name in ("phase", "generation", "solver")},
+        "confidence": None,
+        **entries,
+    }

@@ -1,0 +1,51 @@
+"""Where a draw lands, simulated whenever it is asked: the paper's way to train."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sling2sim2real.launching.surface.landing_map import Launcher
+from sling2sim2real.launching.surface.response_surface import (
+    NO_FAILURE,
+    TOO_MUCH_FORCE,
+    Landings,
+    ResponseSurface,
+)
+
+
+class SimulatedLandings:
+    """Landings in the place of a `ResponseSurface`: each draw is launched in the simulator.
+
+    Attributes:
+        reasons: Names of the failure codes, more with each new one; code 0 is success.
+        low, high: Corners of the box of draws [m], shape (2,).
+    """
+
+    def __init__(self, launcher: Launcher, surface: ResponseSurface) -> None:
+        """Launch in the box and under the force limit of a surface.
+
+        Args:
+            launcher: Simulates draws, shape (N, 2) [m], without a force limit of its own.
+            surface: Read between launches of the same simulator.
+        """
+        self.launcher, self.max_force = launcher, surface.max_force
+        self.low, self.high = surface.low, surface.high
+        self.reasons = [NO_FAILURE, TOO_MUCH_FORCE]
+
+    def __call__(self, draws: np.ndarray) -> Landings:
+        """Landings of draws, shape (N, 2) [m]."""
+        launched = self.launcher(np.asarray(draws, float))
+        force = np.asarray(launched.hold_force, float)
+        failure = np.array([self._code(reason) for reason in launched.failure], int)
+        failure = np.where((failure == 0) & (force > self.max_force), 1, failure)
+        landing = np.asarray(launched.landing_y, float)
+        return Landings(np.where(failure > 0, np.nan, landing), force, failure)
+
+    def _code(self, reason: str | None) -> int:
+        name = reason or NO_FAILURE
+        if name not in self.reasons:
+            self.reasons.append(name)
+        return self.reasons.index(name)
+
+
+Source = ResponseSurface | SimulatedLandings  # of landings

@@ -1,0 +1,104 @@
+"""Where the policy of a band and a method lies, and what it says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+
+from sling2sim2real.base.layout import Layout, NotMade, made
+from sling2sim2real.base.schema import LIST, JsonRecord, read_json
+
+
+class Training(JsonRecord):
+    """Errors are launched |y_p - g| [m] of the checked targets; None where none lands."""
+
+    converged: bool
+    mean_error_m: float | None
+    max_error_m: float | None
+
+
+class MapError(JsonRecord):
+    """Error of reading between simulated launches, on so many random draws [m].
+
+    None where none lands.
+    """
+
+    draws: int
+    mean_error_m: float | None
+    max_error_m: float | None
+
+
+class LandingMapErrors(JsonRecord):
+    box: MapError
+    target_range: MapError
+
+
+class Projectile(JsonRecord):
+    trained_at: Annotated[tuple[float, float], LIST]  # (y, z), m
+
+
+class Card(JsonRecord):
+    """The part of a policy's card (policy/export.py) that is read."""
+
+    training: Training
+    landing_map: LandingMapErrors
+    made_with: dict[str, Any] | None = None  # settings of params.yaml (params/provenance.py)
+    projectile: Projectile | None = None  # of a policy that sees it
+
+
+@dataclass(frozen=True)
+class Stored:
+    """The policy of `method` for `band`.
+
+    Attributes:
+        root: Of the project.
+    """
+
+    band: str
+    method: str
+    root: Path = Path()
+
+    @property
+    def folder(self) -> Path:
+        """Where its files lie, or would."""
+        return Layout(self.root).policy(self.band, self.method)
+
+    def card(self) -> dict:
+        """What its card says (export.card). Raises NotMade: missing, or damaged."""
+        return read_json(made(self.folder / "card.json"), Card).model_dump()
+
+    def draws(self, targets: np.ndarray) -> np.ndarray:
+        """Draws (y, z) [m], shape (N, 2), for targets [m], (N,).
+
+        Raises:
+            NotMade: The policy is not there, or damaged.
+        """
+        import onnxruntime
+
+        path = made(self.folder / "policy.onnx")
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        options.log_severity_level = 4  # what is wrong is said below
+        given = {"target": np.asarray(targets, np.float32)[:, None]}
+        try:
+            session = onnxruntime.InferenceSession(
+                path.read_bytes(), options, providers=["CPUExecutionProvider"]
+            )
+            if "projectile" in {port.name for port in session.get_inputs()}:
+                at = np.array(self._projectile(), np.float32)
+                given["projectile"] = np.tile(at, (len(given["target"]), 1))
+            return np.asarray(session.run(["draw"], given)[0], float)
+        except NotMade:
+            raise
+        except Exception as error:  # onnxruntime has an error of its own for each kind of damage
+            raise NotMade(path, "damaged") from error
+
+    def _projectile(self) -> tuple[float, float]:
+        """Where the projectile starts (y, z) [m], as the policy was trained with."""
+        projectile = self.card()["projectile"]
+        if projectile is None:
+            raise NotMade(self.folder / "card.json", "lacks the policy's input `projectile`")
+        return projectile["trained_at"]

@@ -1,0 +1,281 @@
+"""The release of the band: a change point of the force that lasts and leaves the hand free.
+
+First roughly: peaks of the difference of means before and after (`change`). Then, around the one
+that is the release, the onset of the fall between samples, as a mean over all straight falls that
+may have been. What tells the release from slips, knocks and new zeros stands in `ReleaseLimits`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.change import means, reach, sample_noise
+from sling2sim2real.recording.grasp import LEAST_LEAD_IN, Opening, fingers_closed, fingers_open
+
+SETTLE = 0.4  # s after the release until the hand is free and at rest
+RUBBER = 0.006  # s: pads open in less, and rubber follows them at once
+
+
+@dataclass(frozen=True)
+class ReleaseLimits:
+    """Thresholds of the force; the drop is from the held force to that of the free hand."""
+
+    pull: float = 0.5  # N: what drops by less was not drawn
+    sudden: float = 0.5  # of a lasting change that comes at once where a band is let go
+    slip: float = 0.2  # of the largest drop, from which another sudden one is worth a word
+    free: float = 0.3  # of the held force that a free hand may still feel
+    noise: float = 6.0  # standard deviations: a sample that is off by more is no longer held,
+    held: float = 0.02  # of the drop: if it is off by more than this as well
+    least_noise: float = 0.003  # of the drop: no fall is so straight that samples tell more
+    gap: float = 3.5  # periods around the release in which force must not be missing
+    before: tuple[float, int] = (0.006, 6)  # s, samples: so early may begin what noise hides
+    slowest: float = 0.03  # s: no band is let go more slowly
+    looked: float = 0.5  # of the drop: what comes later does not tell the fall's beginning,
+    rings: float = 0.15  # of the drop: for the sensor may ring by this
+    timed: tuple[float, float] = (0.9, 0.3)  # of the held force, between which a fall is timed
+    periods: float = 3.0  # that it takes at least where a filter made it,
+    alike: float = 0.4  # correlation of neighbouring samples' noise: and that the filter leaves
+
+
+LIMITS = ReleaseLimits()
+
+
+@dataclass(frozen=True)
+class Release:
+    """The end of the pull.
+
+    Attributes:
+        time: The force begins to drop [s].
+        error: Standard deviation of `time` [s], by the samples' spacing and noise, and by the delay
+            of a filter.
+        fall: In which the force falls to nothing [s]; where that is over between two samples, some
+            of their distance.
+        resolution: Time between force samples around it [s].
+        hold: Mean force while held, sensor frame, bias included [N], shape (3,).
+        noise: Standard deviation of one force sample along the pull [N].
+        drop: How much the force fell [N].
+        slips: Sudden drops of the force before the release [s].
+        spread: Time from 9 to 3 tenths of the held force [s].
+        filtered: It is more than rubber needs: a filter is between sensor and recording.
+    """
+
+    time: float
+    error: float
+    fall: float
+    resolution: float
+    hold: np.ndarray
+    noise: float
+    drop: float
+    slips: list[float] = field(default_factory=list)
+    spread: float = 0.0
+    filtered: bool = False
+
+
+def find_releases(t: np.ndarray, force: np.ndarray, gripper: Opening | None) -> list[float]:
+    """About when the pulls of a recording end [s]; none where nothing tells.
+
+    With a gripper they end where the fingers open, and where a band slips out that was grasped for
+    this pull, if it is grasped anew for the next one. Arguments are those of `find_release`.
+    """
+    releases: list[float] = []
+    try:
+        drops = _Drops.of(t, force, gripper)
+    except UserError:
+        return []
+    for i, later in pairwise([*drops.free, None]):
+        if gripper is not None and i not in drops.ends:
+            moments = (float(t[k]) for k in (i, i if later is None else later))
+            grasp, again = (fingers_closed(*gripper, moment) for moment in moments)
+            if grasp is None or (releases and grasp < releases[-1]):
+                continue
+            if later is not None and (again is None or again < t[i]):
+                continue
+        releases.append(float(t[i]))
+    return releases
+
+
+def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = None) -> Release:
+    """Find the release in a raw force, whose bias need not be known.
+
+    Sudden drops that last are found first, by differences of short and of long means before and
+    after: a knock does not last. The release is the one that leaves the hand free, or else the
+    largest, and with a gripper one at which the fingers open. Around it, the moment at which the
+    fall begins is the mean over all straight falls, weighed by how well they go with the samples.
+
+    Args:
+        t: Times [s], shape (S,).
+        force: Any constant frame [N], shape (S, 3).
+        gripper: None where it was not recorded.
+
+    Raises:
+        UserError: if the force never drops as it does when a drawn band is let go, or does so
+            more than once.
+    """
+    period = float(np.median(np.diff(t)))
+    drops, (_, far) = _Drops.of(t, force, gripper), reach(t)
+    center = drops.release(t)
+
+    # The force along the drop: while held, and once the hand is free.
+    quiet = slice(max(0, center - 6 * far), center - far)
+    settled = slice(min(center + far, len(t) - 1), min(center + 6 * far, len(t)))
+    hold, free = force[quiet].mean(axis=0), force[settled].mean(axis=0)
+    drop = float(np.linalg.norm(hold - free))
+    along = force @ ((hold - free) / drop)
+    level, noise = along[quiet].mean(), sample_noise(along[quiet])
+    threshold = max(LIMITS.noise * noise, LIMITS.held * drop)
+
+    # Half of the fall, and the first sample that is not held any more.
+    window = slice(quiet.stop - far, settled.stop)
+    half = window.start + int(np.argmax(along[window] < level - drop / 2))
+    first = _behind_last(along[:half] > level - threshold, half)
+    resolution = float(t[first] - t[first - 1])
+    if resolution > LIMITS.gap * period:
+        raise UserError(
+            f"force is missing for {1e3 * resolution:.0f} ms around the release at"
+            f" {t[first]:.3f} s: its time cannot be determined, record again"
+        )
+    fall = (level - along) / drop
+    time, error, lasted = _onset(t, fall, first, max(noise / drop, LIMITS.least_noise), period)
+    slips = [float(t[i]) for i in drops.at if i < center]
+    spread = _fall_time(t, along, half, *(level - drop * (1 - share) for share in LIMITS.timed))
+    filtered = spread > LIMITS.periods * period and (
+        spread > RUBBER or _alike(along[quiet]) > LIMITS.alike
+    )
+    if filtered:  # it may have been applied forwards, or both ways
+        error = float(np.hypot(error, spread / 2))
+    return Release(time, error, lasted, resolution, hold, noise, drop, slips, spread, filtered)
+
+
+def _behind_last(which: np.ndarray, otherwise: int) -> int:
+    """Number of the sample behind the last one that is marked (S,)."""
+    marked = np.flatnonzero(which)
+    return int(marked[-1]) + 1 if len(marked) else otherwise
+
+
+def _fall_time(t: np.ndarray, x: np.ndarray, half: int, high: float, low: float) -> float:
+    """Time [s] from when x (S,) is last above a value to when it is first below another.
+
+    Args:
+        half: A sample between the two.
+    """
+    below = x[half:] < low
+    last = half + int(np.argmax(below)) if below.any() else len(x) - 1
+    return _crossing(t, x, low, last) - _crossing(t, x, high, _behind_last(x[:half] > high, half))
+
+
+def _crossing(t: np.ndarray, x: np.ndarray, value: float, k: int) -> float:
+    """Time [s] at which x (S,) falls below a value between samples k - 1 and k; linear between."""
+    return float(np.interp(-value, [-x[k - 1], -min(x[k], x[k - 1])], [t[k - 1], t[k]]))
+
+
+def _alike(x: np.ndarray) -> float:
+    """Correlation of neighbouring samples (S,) of noise about a straight line."""
+    at = np.arange(len(x))
+    left = x - np.polyval(np.polyfit(at, x, 1), at)
+    return float(left[1:] @ left[:-1] / max(left @ left, 1e-30))
+
+
+class _Drops(NamedTuple):
+    """Sudden drops of the force that last.
+
+    Attributes:
+        at: Their samples, shape (K,).
+        size: Of a drop at each sample of the force [N], shape (S,).
+        free: Samples of those that leave the hand free.
+        ends: Of these, those at which the fingers open; all of them where they open at none.
+    """
+
+    at: np.ndarray
+    size: np.ndarray
+    free: list[int]
+    ends: list[int]
+
+    @classmethod
+    def of(cls, t: np.ndarray, force: np.ndarray, gripper: Opening | None) -> _Drops:
+        """Find them by the difference of short and of long means. Raises UserError."""
+        near, far = reach(t)
+        sudden = np.linalg.norm(np.subtract(*means(force, near, far)), axis=1)
+        before, after = means(force, far, 6 * far)
+        lasting = np.linalg.norm(before - after, axis=1)
+        size = np.where(sudden >= LIMITS.sudden * lasting, np.minimum(sudden, lasting), 0)
+        size[: far + 1] = size[-far:] = 0
+        largest = size.max()
+        least = max(LIMITS.pull, LIMITS.slip * largest)
+        at, _ = find_peaks(size, height=least, distance=far)
+        at = np.array([i for i in at if _median_step(force, i, far) > least], int)
+        if not len(at):
+            raise UserError(_no_drop(t, force, lasting[far:-far], size, far))
+        rest = force[t < t[0] + LEAST_LEAD_IN].mean(axis=0)
+        held, left = (np.linalg.norm(x[at] - rest, axis=1) for x in (before, after))
+        freed = left < LIMITS.free * held
+        opened = [i for i in at[freed] if gripper and fingers_open(*gripper, float(t[i]))]
+        large = at[freed & (size[at] >= LIMITS.sudden * largest)]
+        free = sorted({*large.tolist(), *map(int, opened)})
+        return cls(at, size, free, opened or free)
+
+    def release(self, t: np.ndarray) -> int:
+        """The sample at which the band is let go. Raises UserError where several could be it."""
+        if len(self.ends) > 1:
+            times = " and ".join(f"{t[i]:.1f}" for i in self.ends)
+            raise UserError(f"a band is let go at {times} s: nothing tells the pulls apart")
+        return int(self.ends[0] if self.ends else self.at[np.argmax(self.size[self.at])])
+
+
+def _no_drop(
+    t: np.ndarray, force: np.ndarray, lasting: np.ndarray, size: np.ndarray, far: int
+) -> str:
+    """Why no sudden drop is found: too slow, in other units, or not there."""
+    slow, noise = float(lasting.max(initial=0)), sample_noise(force)
+    whole = float(np.linalg.norm(np.ptp(force, axis=0)))
+    if slow > max(LIMITS.pull, LIMITS.sudden * whole):
+        at = t[far + int(np.argmax(lasting))]
+        return (
+            f"the force falls by {slow:.1f} N at {at:.1f} s, but not at once as rubber does: it is"
+            " filtered; record the sensor's own, unfiltered force"
+        )
+    if 0 < 30 * noise / np.sqrt(far) < size.max() < LIMITS.pull / 5:
+        return (
+            f"the force drops suddenly, but by {size.max():.2g} N only: a drawn band pulls with"
+            " newtons; is it in kilonewtons? Let the driver publish newtons"
+        )
+    return f"the force never drops by {LIMITS.pull} N at once: no release of a drawn band is in it"
+
+
+def _median_step(force: np.ndarray, i: int, far: int) -> float:
+    """Size of a step as the difference of long medians: blind to a knock, which means are not."""
+    before, after = force[max(0, i - 6 * far) : i - far], force[i + far : i + 6 * far]
+    return float(np.linalg.norm(np.median(before, axis=0) - np.median(after, axis=0)))
+
+
+def _onset(
+    t: np.ndarray, fall: np.ndarray, first: int, noise: float, period: float
+) -> tuple[float, float, float]:
+    """Mean and standard deviation of when the fall (0 held, 1 gone) began, and how long it lasted.
+
+    The posterior of a change point, on a grid: over all straight falls that begin at r and last D,
+    of any D alike on a logarithmic scale, with Gaussian noise. What comes after half of the fall is
+    not looked at: a sensor may ring there. A fall that is over between two samples is thus found
+    between them, not at the second one.
+    """
+    looked, (before, samples), last = LIMITS.looked, LIMITS.before, first
+    while last + 1 < len(t) and fall[last] < looked:
+        last += 1
+    earliest = max(0, first - max(samples, round(before / period)))
+    begin = np.arange(t[earliest], t[last], period / 100)[:, None]
+    lasts = np.geomspace(period / 20, LIMITS.slowest, 150)
+    misfit = np.zeros((len(begin), len(lasts)))
+    for time, seen in zip(t[earliest : last + 1], fall[earliest : last + 1], strict=True):
+        expected = np.minimum((time - begin).clip(0) / lasts, looked)
+        spread = noise if seen < looked else max(noise, LIMITS.rings)
+        misfit += ((expected - min(seen, looked)) / spread) ** 2
+    both = np.exp((misfit.min() - misfit) / 2)
+    both /= both.sum()
+    weight, lasted = both.sum(axis=1), both.sum(axis=0) @ lasts
+    mean = weight @ begin[:, 0]
+    return float(mean), float(np.sqrt(weight @ (begin[:, 0] - mean) ** 2)), float(lasted)

@@ -1,0 +1,204 @@
+"""Typed view of params.yaml: `load()` refuses unknown keys, wrong types and impossible values.
+
+Attribute names are the keys of the file. Ranges say what makes physical or numerical sense, wide
+enough for any lab. Every violation is a UserError of one line that names the key's path.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import ValidationError, model_validator
+from ruamel.yaml import YAML, YAMLError
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.schema import FILLED, Name, Section, explained, refusal
+from sling2sim2real.base.target import TARGET_AREA
+from sling2sim2real.settings.identification import (
+    LossParams,
+    MethodDefaults,
+    MethodParams,
+    OptimizerParams,
+    ParameterBoxes,
+    SlingParams,
+    check_method,
+    methods_by_step,
+)
+from sling2sim2real.settings.lab import BandName, BandParams, PlanParams, RunParams, SetupParams
+from sling2sim2real.settings.launches import FloorParams, LaunchParams, PolicyParams, TrialsParams
+from sling2sim2real.settings.recording import CloudParams, EpisodeParams, ForceParams
+from sling2sim2real.settings.virtual_rig import RigParams
+
+
+class Params(Section):
+    run: RunParams
+    bands: Annotated[dict[BandName, BandParams], FILLED]
+    setup: SetupParams
+    plan: PlanParams
+    episode: EpisodeParams
+    force: ForceParams
+    cloud: CloudParams
+    sling: SlingParams
+    parameters: ParameterBoxes
+    loss: LossParams
+    optimizer: OptimizerParams
+    method_defaults: MethodDefaults
+    methods: Annotated[dict[Name, MethodParams], FILLED]
+    policy: PolicyParams
+    launch: LaunchParams
+    trials: TrialsParams
+    floor: FloorParams
+    rig: RigParams
+
+    @model_validator(mode="before")
+    @classmethod
+    def _methods_are_whole(cls, content: object) -> object:
+        """A method's own keys win; what it leaves out is as `method_defaults` says."""
+        if not isinstance(content, dict):
+            return content
+        defaults, methods = content.get("method_defaults"), content.get("methods")
+        if not (isinstance(defaults, dict) and isinstance(methods, dict)):
+            return content
+        whole = {
+            name: {**defaults, **method} if isinstance(method, dict) else method
+            for name, method in methods.items()
+        }
+        return content | {"methods": whole}
+
+    @model_validator(mode="after")
+    def _names_agree(self) -> Params:
+        for key, names, defined in (
+            ("bands", self.run.bands, self.bands),
+            ("own", self.run.own, self.bands),
+            ("dips", self.run.dips, self.bands),
+            ("methods", self.run.methods, self.methods),
+            ("ablations.methods", self.run.ablations.methods, self.methods),
+        ):
+            for name in names:
+                if name not in defined:
+                    raise refusal(f"run.{key}: {name} is not one of {', '.join(defined)}")
+        for band in self.run.ablations.bands:
+            if band not in self.run.bands:
+                raise refusal(f"run.ablations.bands: {band} is not one of run.bands")
+        for band in self.run.own:
+            if self.bands[band].source == "rig":
+                raise refusal(f"run.own: {band} has source: rig, so it belongs under run.bands")
+        for band in self.run.dips:
+            if self.bands[band].source == "recording":
+                raise refusal(f"run.dips: {band} has source: recording: put it under run.own")
+        first = self.run.methods[:1]
+        for key, steps, whose, methods in (
+            ("run.steps", self.run.steps, "run.methods", self.run.methods),
+            ("run.own_steps", self.run.own_steps, "run.methods[0]", first),
+            (
+                "run.ablations.steps",
+                self.run.ablations.steps,
+                "run.ablations.methods",
+                self.run.ablations.methods,
+            ),
+        ):
+            for step, names in methods_by_step(methods, self.methods).items():
+                if list(getattr(steps, step)) != names:
+                    raise refusal(
+                        f"{key}.{step}: must list those of {whose} whose search has this step:"
+                        f" [{', '.join(names)}]"
+                    )
+        for key, run in (("run", self.run), ("run.ablations", self.run.ablations)):
+            rig = [name for name in run.bands if self.bands[name].source == "rig"]
+            if list(run.rig) != rig:
+                raise refusal(
+                    f"{key}.rig: must list those of {key}.bands that have source: rig, in the same"
+                    f" order: [{', '.join(rig)}]"
+                )
+        for name in (*self.run.rig, *self.run.dips):
+            if name not in self.rig.bands:
+                raise refusal(f"rig.bands: lacks {name}, which the rig is to record")
+        return self
+
+    @model_validator(mode="after")
+    def _sections_fit(self) -> Params:
+        for name, method in self.methods.items():
+            check_method(method, f"methods.{name}.", self.parameters, self.optimizer)
+        if self.setup.foot_height >= self.setup.fork_height:
+            raise refusal("setup.foot_height: must be less than setup.fork_height")
+        if self.setup.draw_z[0] <= -self.setup.fork_height:
+            raise refusal("setup.draw_z: must be above the floor, setup.fork_height below the tips")
+        for name, band in self.bands.items():
+            if band.rest_length <= self.setup.fork_width:
+                raise refusal(
+                    f"bands.{name}.rest_length: {band.rest_length:g} must be longer than"
+                    f" setup.fork_width, {self.setup.fork_width:g}"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _likes_have_one_size(self) -> Params:
+        for name, band in self.rig.bands.items():
+            if band.like is None or not {name, band.like} <= self.bands.keys():
+                continue
+            for what in ("mass", "diameter", "rest_length"):
+                if getattr(self.bands[name], what) != getattr(self.bands[band.like], what):
+                    raise refusal(
+                        f"bands.{name}.{what}: must be that of {band.like}, which"
+                        f" rig.bands.{name} is like"
+                    )
+        return self
+
+    @model_validator(mode="after")
+    def _trials_are_trained(self) -> Params:
+        low, high = self.policy.targets
+        for target in self.trials.targets:
+            if not low <= target <= high:
+                raise refusal(
+                    f"trials.targets: {target} lies outside policy.targets [{low}, {high}]"
+                )
+            if not TARGET_AREA[0] <= target <= TARGET_AREA[1]:
+                raise refusal(
+                    f"trials.targets: {target} lies outside the target on the floor,"
+                    f" {list(TARGET_AREA)}, where every landing counts as failed"
+                )
+        return self
+
+
+def expect_known(params: Params, kind: str, name: str, called: str | None = None) -> None:
+    """Raises UserError where there is no such `kind`, band or method; `called` names it."""
+    defined = getattr(params, f"{kind}s")
+    if name not in defined:
+        raise UserError(
+            f"{called or kind} {name}: not in params.yaml, which has {', '.join(defined)}"
+        )
+
+
+def load(path: str | Path = "params.yaml") -> Params:
+    """Read and check params.yaml. Raises UserError."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise UserError(f"{path}: no such file; run this in the project's folder") from error
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not UTF-8 text"
+        raise UserError(f"{path}: cannot be read ({reason})") from error
+    return parse(text, str(path))
+
+
+def parse(text: str, name: str = "params.yaml") -> Params:
+    """Check the text of a params.yaml; `name` stands in error messages. Raises UserError."""
+    try:
+        content = YAML(typ="safe").load(text)  # the parser that DVC uses
+    except (YAMLError, ValueError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f", line {mark.line + 1}" if mark else ""
+        what = getattr(error, "problem", None) or str(error).partition("\n")[0]
+        raise UserError(f"{name}{where}: not valid YAML ({what})") from error
+    return check(content, name)
+
+
+def check(content: object, name: str = "params.yaml") -> Params:
+    """Check what a params.yaml holds; `name` stands in error messages. Raises UserError."""
+    if not isinstance(content, dict):
+        raise UserError(f"{name}: must hold a mapping of sections such as `run:` and `bands:`")
+    try:
+        return Params.model_validate(content)
+    except ValidationError as error:
+        raise UserError(f"{name}: {explained(error, Params)}") from error

@@ -1,0 +1,275 @@
+"""What params.yaml says of the simulator, the loss and the search."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Generic, Literal, TypeVar
+
+from pydantic import AfterValidator, model_validator
+
+from sling2sim2real.base.imported import is_import
+from sling2sim2real.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
+from sling2sim2real.settings.lab import StepParams
+
+Step = Annotated[float, Range(1e-5, 0.05)]
+Bound = TypeVar("Bound", bound=float)
+KTop = Annotated[int, Range(1, 50)]
+Law = Literal["neo_hookean", "rubber"]  # of the band's material
+# What each has beside the five, and how far its box may reach.
+LAWS: dict[str, dict[str, tuple[float, float]]] = {
+    "neo_hookean": {},
+    "rubber": {
+        "mooney_share": (-1.0, 1.0),
+        "upturn": (0.0, 1.0),
+        "softening": (0.0, 0.9),
+        "relaxation": (0.0, 0.2),
+        "flow": (0.0, 1.0),
+        "log_flow_rate": (-1.0, 6.0),
+    },
+}
+LEAST_SQUARES = "least_squares"
+UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
+SEARCHES = ("multistart", LEAST_SQUARES, "de", "bo", "adam")
+STEPS = {  # stages of a search before `theta`; a class of the user's has `search`
+    "multistart": ("history", "clusters", "cma"),
+    LEAST_SQUARES: ("history", "density"),
+    **{name: (name,) for name in ("de", "bo", "adam")},
+}
+OUR_ENGINE = "sling"
+ENGINES = OUR_ENGINE, "physx"
+
+
+class SlingParams(Section):
+    edges: Annotated[int, Range(4, 400)]
+    grading: Annotated[float, Range(1, 20)]
+    grip_step: Step
+    hold_step: Step
+    recoil_step: Step
+    recoil_time: Annotated[float, Range(1e-3, 10)]
+    swing_step: Step
+    launch_step: Step
+    launch_time: Annotated[float, Range(0.01, 10)]
+
+    @model_validator(mode="after")
+    def _middle_is_a_layer(self) -> SlingParams:
+        if self.edges % 2:
+            raise refusal("edges must be even: the hand holds the middle")
+        return self
+
+
+class Box(Section, Generic[Bound]):
+    """One axis of the search; `Bound` says how far the box may reach."""
+
+    low: Bound
+    high: Bound
+    scale: Literal["log", "linear"]
+
+    @model_validator(mode="after")
+    def _low_below_high(self) -> Box:
+        if not self.low < self.high:
+            raise refusal("low must be less than high")
+        if self.scale == "log" and self.low <= 0:
+            raise refusal("low must be above 0 on a log scale")
+        return self
+
+
+YoungsModulus = Annotated[float, Range(1e3, 1e9)]
+PoissonsRatio = Annotated[float, Range(0, 0.495)]
+ElasticityDamping = Annotated[float, Range(1e-6, 1)]
+DynamicFriction = Annotated[float, Range(0, 5)]
+DampingScale = Annotated[float, Range(0, 1)]
+
+
+class ParameterBoxes(Section):
+    youngs_modulus: Box[YoungsModulus]
+    poissons_ratio: Box[PoissonsRatio]
+    elasticity_damping: Box[ElasticityDamping]
+    dynamic_friction: Box[DynamicFriction]
+    damping_scale: Box[DampingScale]
+
+
+class LossParams(Section):
+    chamfer: Literal["symmetric", "clouds"]
+    median_window: Annotated[int, Range(1, 101)]
+
+    @model_validator(mode="after")
+    def _window_has_a_middle(self) -> LossParams:
+        if self.median_window % 2 == 0:
+            raise refusal("median_window must be odd")
+        return self
+
+
+Factor = Annotated[float, Range(0, 1.99)]  # SciPy's differential evolution wants less than 2
+
+
+class OptimizerParams(Section):
+    seed: Seed
+    population: Annotated[int, Range(5, 100_000)]
+    generations: Annotated[int, Range(1, 100_000)]
+    mutation: Annotated[tuple[Factor, Factor], LIST, ASCENDING]
+    recombination: Annotated[float, Range(0, 1)]
+    k_top: KTop
+    k_nn: Annotated[int, Range(6, 10_000)]  # a covariance of five parameters needs six points
+    delta: Annotated[float, Range(1e-3, 2)]
+    cma_population: Annotated[int, Range(4, 10_000)]
+    cma_rollouts: Annotated[int, Range(4, 10_000_000)]
+
+    @model_validator(mode="after")
+    def _budgets_suffice(self) -> OptimizerParams:
+        explored = self.population * (self.generations + 1)
+        if self.k_nn > explored:
+            raise refusal(f"k_nn must be at most population x (generations + 1) = {explored}")
+        iteration = self.k_top * self.cma_population
+        if self.cma_rollouts < iteration:
+            raise refusal(f"cma_rollouts must be at least k_top x cma_population = {iteration}")
+        return self
+
+
+Weight = Annotated[float, Range(0, 1e6)]
+
+
+class Weights(Section):
+    geom: Weight
+    force: Weight
+    work: Weight
+
+    @model_validator(mode="after")
+    def _something_counts(self) -> Weights:
+        if not any((self.geom, self.force, self.work)):
+            raise refusal("at least one weight must be above 0")
+        return self
+
+
+def _one_of(ours: tuple[str, ...], kind: str) -> AfterValidator:
+    """One of ours, or a `kind` of the user's by its place."""
+
+    def check(text: str) -> str:
+        if text not in ours and not is_import(text):
+            raise refusal(f"must be {', '.join(ours)} or package.module:{kind}, got {text!r}")
+        return text
+
+    return AfterValidator(check)
+
+
+def _is_setting(value: object) -> object:
+    if not isinstance(value, bool | int | float | str):
+        raise refusal(f"must be a number, true, false or a text, got {repr(value)[:60]}")
+    return value
+
+
+Value = Annotated[float, Range(-1e9, 1e9)]
+Setting = Annotated[object, AfterValidator(_is_setting)]
+Bounds = Annotated[tuple[Value, Value], LIST]
+
+
+class MethodDefaults(Section):
+    """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
+
+    law: Law
+    search: Annotated[str, _one_of(SEARCHES, "Class")]
+    engine: Annotated[str, _one_of(ENGINES, "function")]
+    settings: dict[str, Setting]
+    fixed: dict[str, Value]
+    bounds: dict[str, Bounds]
+    k_top: KTop | None
+    mounting: bool
+    covariance: bool
+
+
+class MethodParams(MethodDefaults):
+    """What is weighed, what is searched, and how."""
+
+    weights: Weights
+
+    @model_validator(mode="after")
+    def _keys_belong_to_the_search(self) -> MethodParams:
+        given = {"rollouts", "seed", "population"} & {*self.settings}
+        if given:
+            raise refusal(f"settings: {min(given)} stands under `optimizer`, for all methods")
+        if self.search == "multistart" and self.settings:
+            raise refusal("settings are for another search than multistart, which has none")
+        if self.search != "multistart" and not (self.k_top is None and self.covariance):
+            raise refusal(f"k_top and covariance are for search: multistart, not {self.search}")
+        return self
+
+    @model_validator(mode="after")
+    def _least_squares_fixes_the_unseen(self) -> MethodParams:
+        if self.search != LEAST_SQUARES:
+            return self
+        more = {*self.fixed} - {*UNSEEN}
+        if not (more <= {*LAWS[self.law]} and {*UNSEEN} <= {*self.fixed}):
+            raise refusal(
+                f"search: {LEAST_SQUARES} wants `fixed` to name {', '.join(UNSEEN)}, which no pull"
+                " shows, and besides them no more than what its law adds"
+            )
+        if self.settings:
+            raise refusal(f"settings: {LEAST_SQUARES} has none")
+        if self.engine != OUR_ENGINE:
+            raise refusal(f"search: {LEAST_SQUARES} wants engine: {OUR_ENGINE}")
+        return self
+
+    @model_validator(mode="after")
+    def _law_has_its_box(self) -> MethodParams:
+        for name, reach in LAWS[self.law].items():
+            if name not in self.bounds and name not in self.fixed:
+                raise refusal(
+                    f"bounds: {name} is missing, [low, high] within {list(reach)}, which the law"
+                    f" {self.law} searches"
+                )
+        return self
+
+
+def parameter_names(law: str) -> tuple[str, ...]:
+    """The parameters of a law, in the order of all tables: θ, then what the law adds."""
+    return (*ParameterBoxes.model_fields, *LAWS[law])
+
+
+def methods_by_step(
+    methods: Iterable[str], methods_params: Mapping[str, MethodParams]
+) -> dict[str, list]:
+    """What `run.steps` must hold for `methods`, each of which is in `known`."""
+    by_step: dict[str, list] = {step: [] for step in StepParams.model_fields}
+    for name in methods:
+        for step in steps_of(methods_params[name].search):
+            if step in by_step:  # `cma` has the list of `clusters`
+                by_step[step].append(name)
+    return by_step
+
+
+def steps_of(search: str) -> tuple[str, ...]:
+    """The stages of a search, the last of which writes its evaluations."""
+    return STEPS.get(search, ("search",))
+
+
+def check_method(
+    method: MethodParams, path: str, parameters: ParameterBoxes, optimizer: OptimizerParams
+) -> None:
+    """Refuse what a method, whose key ends with `path`, asks for outside the box or the budget."""
+    boxes = {name: (box.low, box.high) for name, box in parameters} | LAWS[method.law]
+    for name, (low, high) in method.bounds.items():
+        if name not in boxes:
+            raise refusal(f"{path}bounds: {name} is not one of {', '.join(boxes)}")
+        least, most = boxes[name]
+        if not least <= low < high <= most:
+            whose = f"parameters.{name}, " if name not in LAWS[method.law] else ""
+            raise refusal(
+                f"{path}bounds.{name}: must be [low, high] within {whose}{least:g} to {most:g},"
+                f" got {[low, high]}"
+            )
+    boxes |= method.bounds
+    for name, value in method.fixed.items():
+        if name not in boxes:
+            raise refusal(f"{path}fixed: {name} is not one of {', '.join(boxes)}")
+        low, high = boxes[name]
+        if not low <= value <= high:
+            raise refusal(
+                f"{path}fixed.{name}: must be between {low:g} and {high:g}, got {value:g}"
+            )
+    if not {*boxes} - {*method.fixed}:
+        raise refusal(f"{path}fixed: names every parameter, so none is left to search")
+    iteration = (method.k_top or 1) * optimizer.cma_population
+    if optimizer.cma_rollouts < iteration:
+        raise refusal(
+            f"{path}k_top: k_top x optimizer.cma_population = {iteration} is more than"
+            f" optimizer.cma_rollouts, {optimizer.cma_rollouts}"
+        )

@@ -1,0 +1,221 @@
+"""What params.yaml says of a lab: what to run, bands, set-up and recorded pull."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BeforeValidator, model_validator
+
+from sling2sim2real.base.schema import (
+    ASCENDING,
+    FILLED,
+    LIST,
+    UNIT,
+    Component,
+    Direction,
+    Metres,
+    Name,
+    Names,
+    Pose,
+    Range,
+    Section,
+    refusal,
+)
+
+
+def _lies_beside(name: str) -> str:
+    if name != Path(name).name or name.startswith("."):
+        raise refusal(f"must be the name of a file in robots/, got {name!r}")
+    return name
+
+
+FileName = Annotated[str, FILLED, AfterValidator(_lies_beside)]
+
+
+def _is_free(name: str) -> str:
+    if name.lower() == "measured":
+        raise refusal("data/trials/measured holds measured landings, choose another name")
+    return name
+
+
+BandName = Annotated[Name, AfterValidator(_is_free)]
+
+
+class StepParams(Section):
+    """The methods that go through a step of their search, by the step's stage in dvc.yaml.
+
+    They follow from `methods.<name>.search`, which DVC cannot look up.
+    """
+
+    history: Names
+    clusters: Names
+    density: Names
+    de: Names
+    bo: Names
+    adam: Names
+    search: Names
+
+
+class Ablations(Section):
+    """Methods that run on some bands only."""
+
+    bands: Names
+    rig: Names
+    methods: Names
+    steps: StepParams
+
+
+class RunParams(Section):
+    bands: Annotated[Names, FILLED]
+    rig: Names
+    own: Names
+    dips: Names
+    methods: Annotated[Names, FILLED]
+    steps: StepParams
+    own_steps: StepParams
+    ablations: Ablations
+
+    @model_validator(mode="after")
+    def _nothing_runs_twice(self) -> RunParams:
+        for method in self.ablations.methods:
+            if method in self.methods:
+                raise refusal(f"ablations.methods: {method} is one of run.methods already")
+        for key, bands in (("own", self.own), ("dips", self.dips)):
+            for band in bands:
+                if band in self.bands:
+                    raise refusal(f"{key}: {band} is one of run.bands already")
+        return self
+
+
+class BandParams(Section):
+    source: Literal["recording", "rig"]
+    mass: Annotated[float, Range(1e-4, 1)]
+    diameter: Annotated[float, Range(5e-4, 0.05)]
+    rest_length: Annotated[float, Range(0.05, 3)]
+    preconditioned: bool | Annotated[float, Range(0, 3)] = False
+
+    @property
+    def density(self) -> float:
+        """Mean over a solid cylinder of this size [kg/m^3]."""
+        return self.mass / (math.pi / 4 * self.diameter**2 * self.rest_length)
+
+
+class Topics(Section):
+    wrench: str | None
+    pose: str | None
+    gripper: str | None
+    color: str | None
+    depth: str | None
+    color_info: str | None
+    depth_info: str | None
+
+
+class Tool(Section):
+    """What the force sensor carries: hand, fingers, flange."""
+
+    mass: Annotated[float, Range(0, 20)]
+    center: Annotated[tuple[Metres, Metres, Metres], LIST]
+
+
+DrawY = Annotated[float, Range(-2, -0.05)]
+DrawZ = Annotated[float, Range(-2, 1)]
+
+
+class SetupParams(Section):
+    fork_width: Annotated[float, Range(0.02, 2)]
+    foot_height: Annotated[float, Range(0, 1)]
+    fork_height: Annotated[float, Range(0.05, 3)]
+    clamp_direction: Direction
+    projectile_mass: Annotated[float, Range(1e-3, 1)]
+    air_density: Annotated[float, Range(0, 100)]
+    grip_force: Annotated[float, Range(0.1, 500)]
+    finger_opening_time: Annotated[float, Range(1e-3, 1)]
+    max_force: Annotated[float, Range(0.1, 1000)]
+    arm_stiffness: Annotated[float, Range(300, 1e6)] | None
+    draw_y: Annotated[tuple[DrawY, DrawY], LIST, ASCENDING]
+    draw_z: Annotated[tuple[DrawZ, DrawZ], LIST, ASCENDING]
+    base_to_fork: Pose | None
+    camera_to_fork: Pose | None
+    urdf: FileName | None
+    tip_link: str | None
+    tool: Tool | None
+    topics: Topics
+
+
+Speed = Annotated[float, Range(0.005, 3)]
+Way = Annotated[float, Range(0, 0.5)]
+Opening = Annotated[float, Range(0, 0.5)]
+Quaternion = Annotated[tuple[Component, Component, Component, Component], LIST, UNIT]
+
+
+def _is_position(value: object) -> object:
+    if value in ("finger", "gap"):
+        return value
+    pair = value if isinstance(value, list | tuple) else ()
+    numbers = [n for n in pair if isinstance(n, int | float) and math.isfinite(n)]
+    if len(pair) != 2 or len(numbers) != 2 or numbers[0] == numbers[1]:
+        raise refusal(f"must be finger, gap, or its numbers [open, closed], got {value!r:.60}")
+    return float(numbers[0]), float(numbers[1])
+
+
+class Gripper(Section):
+    """Gaps between the fingers, and what GripperCommand's `position` is for them.
+
+    `position`: finger, the travel of each (Franka's own action server); gap; or the two numbers
+    themselves, for open and for closed.
+    """
+
+    open: Opening
+    closed: Opening
+    position: Annotated[str | tuple[float, float], BeforeValidator(_is_position)]
+
+    def command(self, gap: float) -> float:
+        """The position that commands a gap [m] between open and closed."""
+        if isinstance(self.position, str):
+            return gap / 2 if self.position == "finger" else gap
+        first, last = self.position
+        return last + (first - last) * (gap - self.closed) / (self.open - self.closed)
+
+    @model_validator(mode="after")
+    def _closed_is_narrower(self) -> Gripper:
+        if self.closed >= self.open:
+            raise refusal("closed must be less than open")
+        return self
+
+
+class Dip(Section):
+    """The drawn band is let back by some way and drawn again, which shows how it unloads."""
+
+    at: Annotated[float, Range(0.1, 1)]  # share of the draw where it begins and ends
+    depth: Annotated[float, Range(0.01, 1)]  # way back towards the fork
+    out_time: Annotated[float, Range(0.05, 20)]
+    back_time: Annotated[float, Range(0.05, 20)]
+
+
+class PlanParams(Section):
+    """How a robot records a band: read by `sling plan`, and by the virtual rig for its dips."""
+
+    draw: Annotated[tuple[DrawY, DrawZ], LIST]
+    dips: Annotated[tuple[Dip, ...], LIST]
+    max_speed: Speed
+    pull_speed: Speed
+    max_acceleration: Annotated[float, Range(0.05, 30)]
+    lead_in: Annotated[float, Range(0.5, 60)]
+    finger_time: Annotated[float, Range(0.05, 10)]
+    pause: Annotated[float, Range(0.5, 60)]  # the held force is the mean of the last 0.5 s
+    wait: Annotated[float, Range(0, 60)]
+    approach: Way
+    retreat: Way
+    floor_clearance: Way
+    hanging: Annotated[float, Range(0, 3)] | None
+    gripper: Gripper
+    orientation: Quaternion | None
+    frame: Annotated[str, FILLED]
+
+    @model_validator(mode="after")
+    def _pulls_slower(self) -> PlanParams:
+        if self.pull_speed > self.max_speed:
+            raise refusal("pull_speed must be at most max_speed")
+        return self

@@ -1,0 +1,93 @@
+"""A band that the simulator made is found again; what is found is kept whole."""
+
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sling2sim2real import Identification, Observed, Settings, aim, identify, launch
+from sling2sim2real.api.launching import _warnings
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.files import write_json
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.identification.posterior.launches import TAPE
+from sling2sim2real.settings.provenance import settings_of
+from sling2sim2real.simulator.parameters import THETA
+from tests.project import DEFAULTS
+
+FITTED = "youngs_modulus", "elasticity_damping", "mooney_share", "relaxation"
+
+
+@pytest.fixture(scope="module")
+def identification(band, settings, world, episode) -> Identification:
+    return identify([episode], band, settings=settings, start=world)
+
+
+@pytest.mark.slow
+def test_a_known_band_is_found_without_a_start(band, settings, world, episode) -> None:
+    summary = []
+    identification = identify([episode], band, settings=settings, progress=summary.append)
+    assert identification.settled
+    for name in FITTED:
+        interval = identification.intervals[name]
+        assert interval.low < getattr(world.theta, name) < interval.high
+        assert interval.value == getattr(identification.theta, name)
+        # which one picture hardly tells
+        assert interval.identifiable or name == "elasticity_damping"
+    assert not identification.intervals["dynamic_friction"].identifiable
+    assert identification.samples.shape == (200, len(identification.theta.names))
+    assert [line.split()[0] for line in summary[:3]] == ["mounting:", "explored", "expansion"]
+    assert abs(np.degrees(np.arcsin(identification.mounting.clamp_direction[0]))) < 10
+
+
+def test_launches_move_what_is_found(band, settings, world, episode, identification) -> None:
+    draw = aim(identification, 2.0).draw
+    before = launch(identification, draw).landing
+    short = Observed(draw, error=1e-3, landing=before - 0.1)
+    after = identify([episode], band, launches=[short], settings=settings, start=identification)
+    assert before - 0.1 - TAPE < launch(after, draw).landing < before - 0.02
+    wide, narrow = (np.ptp(aim(result, 2.0).interval_90) for result in (identification, after))
+    assert narrow < wide
+
+
+def test_what_is_saved_is_loaded(identification, tmp_path) -> None:
+    path = tmp_path / "mine.json"
+    identification.save(path)
+    again = Identification.load(path)
+    assert again == identification and np.array_equal(again.samples, identification.samples)
+    assert aim(again, 2.0) == aim(identification, 2.0)
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"sizes": {"mass": 1}}))
+    with pytest.raises(UserError, match="was not written by Identification.save"):
+        Identification.load(path)
+    with pytest.raises(UserError, match="missing"):
+        Identification.load(tmp_path / "nothing.json")
+
+
+def test_wrong_evidence_is_refused(band, settings, world, episode) -> None:
+    with pytest.raises(UserError, match="at least one episode"):
+        identify([], band)
+    with pytest.raises(UserError, match="draw_y_m must lie between -20 and 0 m"):
+        Observed((0.3, 0.0), 0.0, 2.0)
+    with pytest.raises(UserError, match="the draw's error is needed"):
+        identify([episode], band, launches=[Observed((-0.3, 0.0), None, 2.0)])
+    still = replace(episode, position=np.zeros_like(episode.position))
+    with pytest.raises(UserError, match="lets go at the fork"):
+        identify([still], band, settings=settings, start=world)
+
+
+def test_a_run_of_other_settings_says_what_has_changed(tmp_path) -> None:
+    """And so does what is aimed by it."""
+    shutil.copy(DEFAULTS, tmp_path)
+    params = Settings.load(tmp_path / "params.yaml")
+    made = settings_of(params, "band1", "least_squares") | {"bands.band1.mass": 0.05}
+    soft = dict(zip(THETA, (2.2e5, 0.45, 2e-3, 0.5, 1.0), strict=True))
+    write_json(
+        Layout(tmp_path).theta("band1", "least_squares"),
+        {"band": "band1", "theta": soft, "made_with": made},
+    )
+    identification = Identification.of_run("band1", root=tmp_path)
+    assert identification.changed == ("bands.band1.mass was 0.05, is 0.023",)
+    summary = [*_warnings(identification, (-0.3, -0.1), None, (1.9, 2.1))]
+    assert summary[-1] == f"params.yaml: {identification.changed[0]}, since θ was identified"

@@ -1,0 +1,57 @@
+"""The project's params.yaml as an object, with other values, and wherever one works."""
+
+import pytest
+
+from sling2sim2real import Settings
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.settings import load
+from tests.project import DEFAULTS
+
+
+def test_defaults_are_the_projects_own(nowhere) -> None:
+    """No file lies in the working folder."""
+    ours, theirs = Settings.default().model_dump(), load(DEFAULTS).model_dump()
+    differ = {name for name in theirs if ours[name] != theirs[name]}
+    assert differ == {"bands", "run"}
+
+
+def test_a_fork_of_any_width_will_do() -> None:
+    """Whatever bands the project has."""
+    assert Settings.default(setup={"fork_width": 1.5}).setup.fork_width == 1.5
+
+
+def test_changes_reach_any_depth_and_nothing_else() -> None:
+    old = Settings.default()
+    new = old.changed(rig={"camera": {"focal": 500.0}}, setup={"draw_y": [-0.4, -0.2]})
+    assert (new.rig.camera.focal, new.setup.draw_y) == (500.0, (-0.4, -0.2))
+    back = new.changed(
+        rig={"camera": {"focal": old.rig.camera.focal}}, setup={"draw_y": old.setup.draw_y}
+    )
+    assert back == old
+
+
+def test_coarse_settings_take_changes_too() -> None:
+    settings = Settings.coarse(sling={"edges": 8})
+    assert (settings.sling.edges, settings.sling.grip_step) == (8, 0.01)
+
+
+def test_a_file_of_ones_own(tmp_path) -> None:
+    text = DEFAULTS.read_text().replace("fork_width: 0.275", "fork_width: 0.25")
+    (tmp_path / "mine.yaml").write_text(text)
+    mine = Settings.load(tmp_path / "mine.yaml")
+    assert mine.setup == Settings.default(setup={"fork_width": 0.25}).setup
+    assert mine.bands["band1"].source == "rig"
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"setup": {"fork_width": 5.0}}, "settings: setup.fork_width: must be between 0.02 and 2"),
+        ({"setup": {"width": 0.3}}, "settings: setup.width: unknown key"),
+        ({"sling": {"edges": 7}}, "settings: sling: edges must be even"),
+        ({"stup": {}}, "settings: stup: unknown key"),
+    ],
+)
+def test_wrong_values_are_refused_by_name(changes: dict, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        Settings.default(**changes)

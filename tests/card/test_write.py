@@ -1,0 +1,67 @@
+"""The card as it is written: whole, small, alone, the same twice."""
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.layout import Layout
+from sling2sim2real.card.text import GLOSSARY
+from sling2sim2real.card.write import write
+from sling2sim2real.settings import load
+from tests.card.conftest import BAND, METHOD
+
+FILES = {
+    "README.md", "card.json", "index.html", "animation.webp", "camera.webp", "force.png",
+    "values.png", "landings.png",
+}  # fmt: skip
+LIMITS = {"index.html": 3e6, "animation.webp": 2e6}  # bytes
+
+
+@pytest.fixture(scope="module")
+def folder(project, tmp_path_factory):
+    """The card, written once."""
+    root = shutil.copytree(project, tmp_path_factory.mktemp("written") / "project")
+    write(load(root / "params.yaml"), BAND, METHOD, root)
+    return Layout(root).card(BAND)
+
+
+def test_it_is_whole_and_small(folder) -> None:
+    assert {file.name for file in folder.iterdir()} == FILES
+    for name, most in LIMITS.items():
+        assert (folder / name).stat().st_size < most
+    text = (folder / "README.md").read_text()
+    assert len(text.split()) <= 600
+    shown = re.findall(r"\]\(([^)]+)\)", text)
+    assert set(shown) - {GLOSSARY} == FILES - {"README.md", "card.json", "index.html"}
+    titles = re.findall("^#+ (.*)$", text, re.MULTILINE)
+    assert titles[0].startswith(f"{BAND}: ") and "Where to draw" in titles
+
+
+def test_the_animation_plays(folder) -> None:
+    with Image.open(folder / "animation.webp") as image:
+        assert image.n_frames > 20
+        frames = []
+        for number in (0, image.n_frames // 2, image.n_frames - 1):
+            image.seek(number)
+            frames.append(np.asarray(image.convert("RGB"), int))
+    assert all(np.abs(a - b).max() > 100 for a, b in zip(frames, frames[1:], strict=False))
+    magenta = np.abs(frames[0][60:, 480:] - [0xE0, 0, 0x7A]).max(axis=2) < 60
+    assert magenta.sum() > 200  # the simulated band
+
+
+def test_equal_inputs_give_equal_bytes(folder, copied) -> None:
+    write(load(copied / "params.yaml"), BAND, METHOD, copied)
+    for file in folder.iterdir():
+        assert file.read_bytes() == (Layout(copied).card(BAND) / file.name).read_bytes(), file.name
+
+
+def test_a_missing_input_leaves_nothing_half_written(copied) -> None:
+    layout = Layout(copied)
+    layout.trials(BAND, METHOD).unlink()
+    with pytest.raises(UserError, match=r"data/trials/toy/least_squares\.parquet"):
+        write(load(copied / "params.yaml"), BAND, METHOD, copied)
+    assert not layout.card(BAND).exists()

@@ -1,0 +1,177 @@
+"""A robot that follows a plan makes a good recording, which tells the next plan its force."""
+
+import shutil
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.cli.plan.force import read_earlier
+from sling2sim2real.cli.plan.plan import plan_recording
+from sling2sim2real.cli.plan.trajectory import Trajectory
+from sling2sim2real.recording.input.reader import read_recording
+from sling2sim2real.settings import load
+from tests.project import DEFAULTS, with_
+from validation.recordings.bag import BASE, HAND, REST, Truth, write_bag
+
+
+@dataclass(frozen=True)
+class Followed(Truth):
+    """The small recording's world, with the hand where the plan has it."""
+
+    way: Trajectory | None = None
+
+    def hand(self, t: float) -> np.ndarray:
+        return self.way.position(t)
+
+
+@dataclass(frozen=True)
+class Repeated(Followed):
+    """Pull after pull; `moments` are the grasp and the release of each."""
+
+    moments: tuple[tuple[float, float], ...] = ()
+
+    def at(self, t: float) -> Followed:
+        """The pull that is going on or was the last."""
+        begun = [moment for moment in self.moments if moment[0] <= t] or self.moments[:1]
+        return Followed(*begun[-1][:1], release=begun[-1][1], draw=self.draw, way=self.way)
+
+    def holds(self, t: float) -> bool:
+        return self.at(t).holds(t)
+
+    def force(self, t: float) -> np.ndarray:
+        return self.at(t).force(t)
+
+    def center_line(self, t: float) -> np.ndarray:
+        return self.at(t).center_line(t)
+
+
+pytestmark = pytest.mark.usefixtures("nowhere")
+
+FAST = {"max_speed": 0.8, "pull_speed": 0.5, "max_acceleration": 5.0, "hanging": 0.195}
+FAST |= {"lead_in": 0.6, "finger_time": 0.3, "pause": 0.8, "wait": 0.5}
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """(path, plan, params) of a recording by a robot that follows a plan, with pictures."""
+    inverse = BASE[0].inv()
+    fork_in_base = (*inverse.apply(-BASE[1]), *inverse.as_quat())
+    whole = load(DEFAULTS)
+    placed = with_(whole, "setup", base_to_fork=tuple(map(float, fork_in_base)))
+    params = with_(with_(placed, "plan", **FAST), "episode", duration=4.2, samples=140, tail=0.5)
+    plan = plan_recording(params, "band1")
+    way, release = plan.trajectory, plan.trajectory.start_of("release") + 3e-4
+    truth = Followed(
+        grasp=way.start_of("lift"), release=release, end=way.duration, draw=0.4, way=way
+    )
+    path = tmp_path_factory.mktemp("plan") / "followed.mcap"
+    write_bag(path, truth)
+    return path, plan, params, truth
+
+
+def test_a_robot_that_follows_the_plan_makes_a_recording_that_check_accepts(recorded) -> None:
+    from sling2sim2real.cli.preflight.check import band_of, look_at
+
+    path, plan, params, truth = recorded
+    np.testing.assert_allclose(
+        Rotation.from_quat(plan.hand).as_matrix(), (BASE[0].inv() * HAND).as_matrix(), atol=1e-9
+    )
+    report = look_at(path, params, band_of(params)).report
+    assert report.usable, report.problem
+    assert report.signals.release_s == pytest.approx(truth.release, abs=1e-3)
+    assert report.signals.draw_m == pytest.approx([0, -0.4, 0], abs=1e-3)
+
+
+@pytest.mark.slow
+def test_a_robot_that_pulls_twice_makes_two_recordings_in_one_file(recorded, tmp_path) -> None:
+    from sling2sim2real.cli.preflight.check import band_of, look_at
+
+    plan = plan_recording(recorded[2], "band1", pulls=2)
+    way, path = plan.trajectory, tmp_path / "twice.mcap"
+    begins = list(zip([phase.name for phase in way.phases], way.times, strict=False))
+    grasps = [time for name, time in begins if name == "lift"]
+    releases = [time + 3e-4 for name, time in begins if name == "release"]
+    moments = tuple(zip(grasps, releases, strict=True))
+    write_bag(path, Repeated(end=way.duration, draw=0.4, way=way, moments=moments))
+    report = look_at(path, recorded[2], band_of(recorded[2]), pull=2).report
+    assert plan.content()["pulls"] == len(report.pulls) == 2
+    assert all(pull.usable for pull in report.pulls), str(report.pulls)
+    assert [pull.release_s for pull in report.pulls] == pytest.approx(releases, abs=1e-3)
+    assert [pull.grasp_s for pull in report.pulls] == pytest.approx(grasps, abs=0.021)
+    assert "rest" not in {caution.about for caution in report.cautions}
+    with pytest.raises(UserError, match="--pulls: at most 10 in one recording, got 11"):
+        plan_recording(recorded[2], "band1", pulls=11)
+
+
+def test_an_earlier_recording_gives_base_frame_and_force(recorded) -> None:
+    """Frame and force are the recording's; the law there is its formula, known at its own draw."""
+    path, plan, params, truth = recorded
+    unknown = with_(params, "setup", base_to_fork=None)
+    again = plan_recording(unknown, "band1", recording=path)
+    np.testing.assert_allclose(again.base.translation, plan.base.translation, atol=1e-6)
+    np.testing.assert_allclose(again.hand, plan.hand, atol=1e-6)
+    assert again.base_source == f"/tf_static fork <- base of {path}"
+    force = float(np.linalg.norm(truth.force(truth.release - 0.1)))
+    assert again.force.force == pytest.approx(force, rel=0.01)
+    deeper = plan_recording(unknown, "band1", recording=path, draw=(-0.44, 0.0)).force
+    stretch = 2 * np.hypot(0.1375, np.array([0.4, 0.44])) / REST
+    tension = stretch - stretch**-2
+    cosine = np.array([0.4, 0.44]) / np.hypot(0.1375, [0.4, 0.44])
+    ratio = np.divide(*(tension * cosine)[::-1])
+    assert deeper.force / again.force.force == pytest.approx(ratio, rel=2e-3)
+    assert deeper.source.endswith("beyond that stretch a band may stiffen")
+    assert "scaled" not in again.force.source
+
+    weak = with_(unknown, "setup", max_force=force - 2)
+    with pytest.raises(UserError, match=r"N more than setup.max_force .*--draw=-0\.\d\d,0\.00"):
+        plan_recording(weak, "band1", recording=path)
+
+
+def test_the_bands_own_recording_tells_it_unasked(recorded, tmp_path) -> None:
+    """As `aim` takes the fork from there; one that cannot be read is passed over."""
+    path, plan, params, _ = recorded
+    unknown, raw = with_(params, "setup", base_to_fork=None), tmp_path / "data/raw/band1"
+    raw.mkdir(parents=True)
+    (raw / "a.mcap").write_bytes(b"no recording")
+    assert plan_recording(unknown, "band1", root=tmp_path).base_source is None
+    shutil.copy(path, raw / "b.mcap")
+    again = plan_recording(unknown, "band1", root=tmp_path)
+    requested = plan_recording(unknown, "band1", recording=path)
+    np.testing.assert_allclose(again.base.translation, plan.base.translation, atol=1e-6)
+    assert (again.frame, again.force.force) == (requested.frame, requested.force.force)
+    assert again.base_source == f"/tf_static fork <- base of {raw / 'b.mcap'}"
+    with pytest.raises(UserError, match="a.mcap: not an MCAP file"):
+        plan_recording(unknown, "band1", recording=raw / "a.mcap", root=tmp_path)
+
+
+def test_of_several_pulls_the_first_that_can_be_used_tells(recorded, monkeypatch) -> None:
+    """A first pull that says nothing is passed over, as `check` does."""
+    from sling2sim2real.recording import pulls, signals
+
+    path, _, params, truth = recorded
+    (whole,) = pulls.pulls_of(pulls.Pull.of(read_recording(path, params.setup), params.setup))
+    tell = signals.signals_of
+
+    def signals_of(pull, *others):
+        if pull == "bad":
+            raise UserError("nothing is drawn")
+        return tell(pull, *others)
+
+    monkeypatch.setattr(signals, "signals_of", signals_of)
+    monkeypatch.setattr(pulls, "pulls_of", lambda *_: ["bad", whole])
+    force = float(np.linalg.norm(truth.force(truth.release - 0.1)))
+    assert read_earlier(path, params).force == pytest.approx(force, rel=0.01)
+    monkeypatch.setattr(pulls, "pulls_of", lambda *_: ["bad", "bad"])
+    assert read_earlier(path, params).problem == f"{path}: nothing is drawn"
+
+
+def test_a_recording_without_a_pull_gives_the_frame_alone(recorded, tmp_path) -> None:
+    path = tmp_path / "still.mcap"
+    write_bag(path, Truth(stiffness=0.0), cameras=False, rate=200)
+    unknown = with_(recorded[2], "setup", base_to_fork=None)
+    plan = plan_recording(unknown, "band1", recording=path)
+    assert plan.force.force is None
+    assert "no release of a drawn band is in it" in plan.force.source

@@ -1,0 +1,365 @@
+"""`sling plan`: frames, files, limits, bands to come."""
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.cli.plan import limits
+from sling2sim2real.cli.plan.force import Earlier, Held, predict
+from sling2sim2real.cli.plan.messages import COLUMNS
+from sling2sim2real.cli.plan.plan import plan_recording, with_band
+from sling2sim2real.cli.plan.trajectory import Phase, Trajectory
+from sling2sim2real.settings import Params, load, parse
+from sling2sim2real.settings.lab import Dip, Gripper
+from tests.project import DEFAULTS, with_
+
+pytestmark = pytest.mark.usefixtures("nowhere")
+
+FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target along the base's x
+
+
+@pytest.fixture(scope="module")
+def params() -> Params:
+    """Without dips, of which tests bring their own."""
+    return with_(with_(load(DEFAULTS), "setup", base_to_fork=FORK_IN_BASE), "plan", dips=())
+
+
+@pytest.fixture(scope="module")
+def plan(params):
+    return plan_recording(params, "band1", draw=(-0.35, -0.1))
+
+
+def dip(**values: float) -> Dip:
+    return Dip(**({"at": 1.0, "depth": 0.1, "out_time": 1.0, "back_time": 1.0} | values))
+
+
+def table(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    numbers = {name: np.array([float(r[name]) for r in rows]) for name in COLUMNS[:-1]}
+    return numbers, [row["phase"] for row in rows]
+
+
+def vectors(columns: dict[str, np.ndarray], names: str) -> np.ndarray:
+    return np.stack([columns[name] for name in names.split()], axis=1)
+
+
+def test_the_csv_is_the_trajectory_in_the_robots_base(plan, tmp_path) -> None:
+    """Taken back to frame O by a matrix that is written out by hand."""
+    columns, phases = table(plan.write(tmp_path, 50.0)[0])
+    t = columns["t"]
+    np.testing.assert_allclose(np.diff(t), 0.02, atol=1e-9)
+    assert plan.trajectory.duration <= t[-1] < plan.trajectory.duration + 0.02
+    to_base = np.array([[0.0, 1, 0, 0.7], [-1, 0, 0, 0.1], [0, 0, 1, 0.4], [0, 0, 0, 1]])
+    back = np.linalg.inv(to_base)
+    for names, derivative, weight in (("x y z", 0, 1.0), ("vx vy vz", 1, 0), ("ax ay az", 2, 0)):
+        given = np.column_stack([vectors(columns, names), np.full(len(t), weight)]) @ back.T
+        wanted = plan.trajectory.position(t, derivative)
+        np.testing.assert_allclose(given[:, :3], wanted, atol=1e-7)
+    hand = Rotation.from_quat(vectors(columns, "qx qy qz qw")).as_matrix()
+    ahead = back[:3, :3] @ hand[0] @ [0, 0, 1]
+    np.testing.assert_allclose(ahead, np.array([0, 0.35, 0.1]) / np.hypot(0.35, 0.1), atol=1e-8)
+    fingers = back[:3, :3] @ hand[0] @ [0, 1, 0]
+    assert fingers[0] == pytest.approx(0, abs=1e-8)  # they close across the band, which lies in x
+    np.testing.assert_array_equal(hand, hand[:1].repeat(len(hand), 0))
+    assert list(dict.fromkeys(phases)) == [phase.name for phase in plan.trajectory.phases]
+    assert set(columns["opening"]) >= {0.08, 0.0}
+
+
+def build(store, kind: str, content: object) -> object:
+    """A rosbags message from JSON, field by field as the type's definition has them."""
+    if kind not in store.types:  # a basic type
+        return content
+    values = {}
+    for field, (node, detail) in store.get_msgdef(kind).fields:
+        if node.name == "NAME":
+            values[field] = build(store, detail, content[field])
+        elif node.name == "BASE":
+            values[field] = content[field]
+        else:
+            (inner, what), _ = detail
+            name = what if inner.name == "NAME" else ""
+            values[field] = [build(store, name, element) for element in content[field]]
+    assert set(values) == set(content)
+    return store.types[kind](**values)
+
+
+def test_the_waypoints_are_a_ros_message_and_the_whole_plan(plan, tmp_path) -> None:
+    """Serialised by rosbags; cubics between its points give back every sample of the CSV."""
+    files = plan.write(tmp_path, 100.0)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kind = "trajectory_msgs/msg/MultiDOFJointTrajectory"
+    message = build(store, kind, json.loads(files[1].read_text()))
+    read = store.deserialize_cdr(store.serialize_cdr(message, kind), kind)
+    assert (read.header.frame_id, read.joint_names) == ("base", ["tcp"])
+
+    stamps = [p.time_from_start for p in read.points]
+    times = np.array([stamp.sec + stamp.nanosec * 1e-9 for stamp in stamps])
+    np.testing.assert_allclose(times, plan.trajectory.path.x, atol=1e-9)
+    places = [p.transforms[0].translation for p in read.points]
+    speeds = [p.velocities[0].linear for p in read.points]
+    spline = CubicHermiteSpline(
+        times, [[p.x, p.y, p.z] for p in places], [[v.x, v.y, v.z] for v in speeds]
+    )
+    columns, _ = table(files[0])
+    inside = columns["t"] <= times[-1]
+    at = columns["t"][inside]
+    np.testing.assert_allclose(spline(at), vectors(columns, "x y z")[inside], atol=1e-7)
+    accelerations = [p.accelerations[0].linear for p in read.points]
+    np.testing.assert_allclose(
+        [[a.x, a.y, a.z] for a in accelerations[:-1]], spline(times[:-1], 2), atol=1e-5
+    )
+    turned = read.points[0].transforms[0].rotation
+    np.testing.assert_allclose([turned.x, turned.y, turned.z, turned.w], plan.hand, atol=1e-12)
+
+
+def test_the_gripper_opens_closes_and_opens(plan, tmp_path) -> None:
+    files = plan.write(tmp_path, 10.0)
+    store = get_typestore(Stores.EMPTY)
+    kind = "control_msgs/msg/GripperCommand"
+    store.register(get_types_from_msg("float64 position\nfloat64 max_effort", kind))
+    commands = json.loads(files[2].read_text())
+    for command in commands:
+        message = build(store, kind, command["command"])
+        assert store.deserialize_cdr(store.serialize_cdr(message, kind), kind) == message
+    positions = [row["command"]["position"] for row in commands]
+    assert positions == [0.04, 0.0, 0.04]  # of each finger of a Franka's hand, which goes 0.04 m
+    assert {row["command"]["max_effort"] for row in commands} == {40.0}
+    stamps = [row["time_from_start"] for row in commands]
+    times = [stamp["sec"] + stamp["nanosec"] * 1e-9 for stamp in stamps]
+    content = json.loads(plan.to_json(files))
+    assert times == pytest.approx([0.0, content["grasp_s"], content["release_s"]])
+
+
+def franka_moves_to(command: dict, width: float) -> float:
+    """What Franka's own action server makes of a command, given the gap as it is.
+
+    gripper_action_server.cpp of franka_ros2, onGripperCommand; RuntimeError where it aborts.
+    """
+    target, most = 2 * command["position"], 0.08
+    if target > most or target < 0:
+        raise RuntimeError(f"Commanding out of range width! max_width = {most} command = {target}")
+    return max(target, 0.006) if target < width else target  # a band of 6 mm between the fingers
+
+
+def test_a_frankas_own_server_opens_closes_and_opens(params, tmp_path) -> None:
+    plan, width, gaps = plan_recording(params, "band1", pulls=2), 0.02, []
+    for row in json.loads(plan.write(tmp_path, 10.0)[2].read_text()):
+        width = franka_moves_to(row["command"], width)
+        gaps.append(width)
+    assert gaps == [0.08, 0.006, 0.08, 0.006, 0.08]
+
+
+@pytest.mark.parametrize(
+    ("position", "wanted"),
+    [("finger", (0.04, 0.0)), ("gap", (0.08, 0.0)), ([0.0, 0.8], (0.0, 0.8)), ([85, 0], (85, 0))],
+)
+def test_other_grippers_take_other_numbers(position, wanted) -> None:
+    """Robotiq's angle of the knuckle grows while it closes."""
+    gripper = Gripper(open=0.08, closed=0.0, position=position)
+    assert (gripper.command(0.08), gripper.command(0.0)) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("position", ["width", [0.1], [0.1, 0.1], [0.1, "x"], None, [0, math.nan]])
+def test_a_position_that_is_none_is_refused(position) -> None:
+    text = DEFAULTS.read_text()
+    wrong = text.replace("position: finger}", f"position: {json.dumps(position)}}}")
+    with pytest.raises(UserError, match=r"plan.gripper.position: must be finger, gap, or its numb"):
+        parse(wrong)
+
+
+def test_without_a_base_the_plan_is_in_frame_o_and_says_so(params, tmp_path) -> None:
+    unknown = with_(params, "setup", base_to_fork=None)
+    plan = plan_recording(unknown, "band1", draw=(-0.35, -0.1))
+    files = plan.write(tmp_path, 10.0)
+    columns, _ = table(files[0])
+    times = columns["t"]
+    np.testing.assert_allclose(
+        vectors(columns, "x y z"), plan.trajectory.position(times), atol=1e-9
+    )
+    assert json.loads(files[1].read_text())["header"]["frame_id"] == "fork"
+    content = json.loads(plan.to_json(files))
+    assert (content["frame"], content["base_to_fork"]) == ("fork", None)
+    assert content["base_to_fork_source"] is None
+    output = next(line for line in plan.to_text(files).splitlines() if line.startswith("fork  "))
+    assert "nothing says where it stands in the robot's base, so all is in frame O" in output
+    turned = with_(unknown, "plan", orientation=(0.0, 0.0, 0.0, 1.0))
+    with pytest.raises(UserError, match="plan.orientation is the hand's in the robot's base"):
+        plan_recording(turned, "band1")
+
+
+def test_what_is_printed(plan, tmp_path) -> None:
+    text = plan.to_text([tmp_path / "a.csv"])
+    assert f"wrote {tmp_path / 'a.csv'}" in text
+    assert "not checked: no θ file and no recording was given" in text
+    content = json.loads(plan.to_json([tmp_path / "a.csv"]))
+    assert content["files"] == [str(tmp_path / "a.csv")]
+    assert content["base_to_fork"] == pytest.approx(FORK_IN_BASE)
+    pull = next(row for row in content["phases"] if row["phase"] == "pull")
+    assert pull["fork"] == [0.0, -0.35, -0.1]
+    assert pull["base"] == pytest.approx([0.35, 0.1, 0.3])
+    assert pull["max_speed_m_s"] == pytest.approx(0.2, rel=1e-3)
+
+
+def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="cannot be written"):
+        plan.write(tmp_path / "file", 100.0)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize(
+    ("section", "values", "expected"),
+    [
+        (
+            "plan",
+            {"draw": (-0.6, 0.0)},
+            "y = -0.6 m lies 0.15 m beyond the -0.45 m of setup.draw",
+        ),
+        ("plan", {"draw": (-0.3, -0.4)}, "z = -0.4 m lies 0.1 m beyond the -0.3 m of setup.draw_z"),
+        ("plan", {"draw": (-0.3, 0.5)}, "z = 0.5 m lies 0.5 m beyond the 0 m of setup.draw_z"),
+        ("plan", {"draw": (-1e-300, 0.0)}, "draw by 0.251 m at least, not 0.000 m"),
+        ("plan", {"draw": (-0.2, 0.0)}, "stretches the band to 0.93 of its rest length"),
+        ("plan", {"floor_clearance": 0.4}, "0.318 m above the floor, 0.082 m less than plan.floor"),
+        ("plan", {"orientation": (0.5, 0.5, 0.5, -0.5)}, "plan.orientation: the fingers (z) would"),
+        (
+            "bands.band1",
+            {"diameter": 0.09},
+            "plan.gripper.open: 0.08 m is no wider than the band, 0.09 m thick",
+        ),
+        ("episode", {"longest": 7.0}, "it takes 7.71 s, 1.51 s more than episode.longest 7 less"),
+        ("plan", {"pull_speed": 0.05}, "raise plan.pull_speed to 0.052, or episode.longest to "),
+        ("plan", {"dips": (dip(depth=0.4),)}, "dip 1 lets the band back by 0.4 m from 0.4 m, and"),
+        ("plan", {"dips": (dip(at=0.5, depth=0.3),)}, "from 0.2 m, and would pass the fork"),
+        ("plan", {"dips": (dip(out_time=0.4),)}, "the let back (plan.dips) reaches 0.5 m/s, 0.1"),
+        (
+            "plan",
+            {"dips": (dip(back_time=15.0),)},
+            "take --pull paper, or shorter plan.dips, or raise",
+        ),
+    ],
+)
+def test_what_is_refused_and_how_it_is_said(params, section, values, expected) -> None:
+    with pytest.raises(UserError) as error:
+        plan_recording(with_(params, section, **values), "band1")
+    assert expected in str(error.value) and "\n" not in str(error.value)
+
+
+def test_the_advice_of_a_refusal_is_enough(params) -> None:
+    """With what the line says, and nothing else changed, the plan is accepted."""
+    plan_recording(with_(params, "plan", pull_speed=0.052), "band1")
+    slow = with_(params, "plan", pull_speed=0.05)
+    plan_recording(with_(slow, "episode", longest=20.6), "band1")
+    with pytest.raises(UserError, match=r"draw by 0.251 m at least, not 0.200 m"):
+        plan_recording(params, "band1", draw=(-0.2, 0.0))
+    plan_recording(params, "band1", draw=(-0.252, 0.0))
+
+
+def test_the_advice_with_dips_and_preconditioning_is_enough(params) -> None:
+    """The speed that the line names is that of the pull, and is accepted."""
+    dips = with_(params, "plan", dips=(dip(), dip(at=0.7)))
+    with pytest.raises(UserError, match="take a smaller --precondition, or take --pull") as error:
+        plan_recording(dips, "band1", precondition=2)
+    progress = float(str(error.value).split("raise plan.pull_speed to ")[1].split(",")[0])
+    plan_recording(with_(dips, "plan", pull_speed=progress), "band1", precondition=2)
+    plan_recording(with_(params, "plan", dips=load(DEFAULTS).plan.dips), "band1", precondition=1)
+    with pytest.raises(UserError, match="--precondition: at most 10, got 11"):
+        plan_recording(dips, "band1", precondition=11)
+
+
+def test_the_informative_pull_is_the_default(params, tmp_path) -> None:
+    dips = with_(params, "plan", dips=(dip(), dip(at=0.7)))
+    plan, paper = (plan_recording(dips, "band1", pull=pull) for pull in ("informative", "paper"))
+    assert plan_recording(dips, "band1").content() == plan.content()
+    assert paper.content() == {**plan_recording(params, "band1").content(), "pull": "paper"}
+    names = [row["phase"] for row in plan.rows()]
+    assert (names.count("let back"), names.count("redraw"), plan.dips) == (2, 2, 2)
+    assert plan.held_time == pytest.approx(paper.held_time + 4.0, abs=1e-6)
+    assert "informative, with 2 dips" in plan.to_text([])
+    assert "paper, with 0 dips" in paper.to_text([])
+    assert len(plan.write(tmp_path, 100.0)) == 4
+
+
+def test_speed_and_acceleration_of_any_trajectory(params) -> None:
+    """A leg of 0.4 m in 1 s reaches 0.8 m/s and 3.2 m/s^2."""
+    leg = [Phase("lift", np.array([0.0, 0.0, 0.4]), 1.0, 0.0)]
+    fast = Trajectory.through(np.zeros(3), 0.0, leg)
+    with pytest.raises(UserError, match=r"lift reaches 0.8 m/s, 0.4 more than plan.max_speed 0.4"):
+        limits.check_motion(fast, params.plan)
+    loose = with_(params.plan, "", max_speed=0.8)
+    with pytest.raises(UserError, match=r"lift reaches 3.2 m/s\^2, 1.2 more than plan.max_acc"):
+        limits.check_motion(fast, loose)
+    limits.check_motion(fast, with_(loose, "", max_acceleration=3.2))
+
+
+def test_a_held_string_pulls_as_its_formula() -> None:
+    """Half the fork 3, drawn by 4: each half is 5 long and gives 4/5 of its tension."""
+    held = Held(half_width=3.0, rest_length=8.0)
+    point = np.array([0.0, -4.0, 0.0])
+    assert held.stretch(point) == pytest.approx(1.25)
+    assert held.force(point) == pytest.approx(2 * 4 / 5 * (1.25 - 1 / 1.25**2))
+    assert held.force(0.5 * point) == held.force(np.zeros(3)) == 0
+    part = held.reach(held.stretch, 1.1, point)
+    assert held.stretch(part * point) == pytest.approx(1.1)
+
+
+def test_the_force_by_theta(params, tmp_path) -> None:
+    from sling2sim2real.identification.results.mounting import load_sling
+    from sling2sim2real.simulator.launch import launch
+    from sling2sim2real.simulator.model import LaunchSetup
+    from sling2sim2real.simulator.parameters import THETA, Parameters
+
+    values = 3e5, 0.45, 5e-3, 0.5, 1.0
+    path = tmp_path / "theta.json"
+    theta = dict(zip(THETA, values, strict=True))
+    path.write_text(json.dumps({"band": "band1", "theta": theta}))
+    setup = LaunchSetup.of(params.setup, params.sling)
+    done = launch(
+        load_sling(params, "band1"), setup, Parameters.of("neo_hookean", values), (-0.3, -0.2)
+    )
+    held = float(done.hold_force[0])
+    planned = plan_recording(params, "band1", draw=(-0.3, -0.2), theta=path)
+    assert planned.force.force == held
+
+    weak = with_(params, "setup", max_force=held - 1)
+    with pytest.raises(UserError, match="1.0 N more than setup.max_force") as error:
+        plan_recording(weak, "band1", draw=(-0.3, -0.2), theta=path)
+    advised = tuple(map(float, str(error.value).split("--draw=")[1].split(",")))
+    assert plan_recording(weak, "band1", draw=advised, theta=path).force.force < held - 1
+
+
+def test_a_force_where_the_band_should_be_slack(params) -> None:
+    shallow = Earlier(Path("a.mcap"), None, "", "", 5.0, np.array([0.0, -0.15, 0.0]), None)
+    with pytest.raises(UserError, match="a.mcap: holds 5.0 N where the band should be slack"):
+        predict(params, "band1", np.array([0.0, -0.4, 0.0]), None, shallow)
+
+
+def test_a_band_that_the_arm_cannot_hold(params) -> None:
+    strong = Earlier(Path("a.mcap"), None, "", "", 900.0, np.array([0.0, -0.4, 0.0]), None)
+    held, drawn = Held.of(params.bands["band1"], params.setup), np.array([0.0, -0.4, 0.0])
+    with pytest.raises(UserError, match="900.0 N .* the band is too stiff for this arm"):
+        limits.check_force(params.setup, held, drawn, predict(params, "band1", drawn, None, strong))
+
+
+def test_a_band_to_come_is_planned_by_its_sizes(params) -> None:
+    unchanged, name = with_band(params, "band1")
+    assert (unchanged, name) == (params, "band1")
+    longer, name = with_band(params, None, 0.04, 0.02, 0.6)
+    assert name == "new" and longer.bands["new"].rest_length == 0.6 and "new" not in params.bands
+    assert plan_recording(longer, name).stretch < plan_recording(params, "band1").stretch
+    assert with_band(params, "red", None, None, 0.6)[1] == "red"
+    for arguments, words in (
+        ((None,), "give --band, or --diameter and --rest-length of a band to come"),
+        (("band1", 0.04), "--band band1 brings its sizes from params.yaml"),
+        ((None, None, None, 0.2), "--rest-length 0.2: must be longer than setup.fork_width 0.275"),
+    ):
+        with pytest.raises(UserError, match=words):
+            with_band(params, *arguments)

@@ -1,0 +1,101 @@
+"""Splines held against finite differences, dense samples and the closed forms of a leg."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
+
+from sling2sim2real.cli.plan.trajectory import Phase, Trajectory
+from sling2sim2real.episode.planned import leg_time
+
+COORDINATE = st.floats(-1, 1).map(lambda x: round(x, 4))
+POINT = st.tuples(COORDINATE, COORDINATE, COORDINATE).map(np.array)
+PHASE = st.builds(
+    Phase, st.sampled_from("abc"), POINT, st.floats(0.05, 5), st.sampled_from([0.0, 0.08])
+)
+TRAJECTORY = st.builds(
+    Trajectory.through, POINT, st.just(0.08), st.lists(PHASE, min_size=1, max_size=5)
+)
+
+
+@given(length=st.floats(1e-3, 3), speed=st.floats(0.01, 3), acceleration=st.floats(0.05, 30))
+def test_a_leg_meets_one_limit_and_keeps_the_other(length, speed, acceleration) -> None:
+    time = leg_time(length, speed, acceleration)
+    way = length * np.array([0.6, 0.0, -0.8])
+    leg = Trajectory.through(np.zeros(3), 0.0, [Phase("leg", way, time, 0.0)])
+    used = leg.peaks(1)[0] / speed, leg.peaks(2)[0] / acceleration
+    assert max(used) == pytest.approx(1.0, rel=1e-9)
+    assert leg.peaks(1)[0] == pytest.approx(2 * length / time, rel=1e-9)
+    assert leg.peaks(2)[0] == pytest.approx(8 * length / time**2, rel=1e-9)
+
+
+@given(trajectory=TRAJECTORY, part=st.floats(0.0, 1.0))
+def test_derivatives_are_those_of_the_position(trajectory, part) -> None:
+    step = 1e-5
+    time = step + part * (trajectory.duration - 2 * step)
+    for derivative in (0, 1):
+        before, after = trajectory.position(np.array([time - step, time + step]), derivative)
+        jerk = trajectory.peaks(3).max()  # the error of a difference across a knot
+        np.testing.assert_allclose(
+            trajectory.position(time, derivative + 1),
+            (after - before) / (2 * step),
+            rtol=1e-6,
+            atol=1e-6 + jerk * step,
+        )
+
+
+@given(trajectory=TRAJECTORY)
+def test_smooth_to_the_second_derivative_and_at_rest_between_phases(trajectory) -> None:
+    ends = [phase.to for phase in trajectory.phases]
+    np.testing.assert_allclose(trajectory.position(trajectory.times[1:]), ends, atol=1e-14)
+    path, knots = trajectory.path, trajectory.path.x[1:-1]
+    for derivative in (0, 1, 2):
+        coefficients = path.derivative(derivative).c if derivative else path.c
+        widths = np.diff(path.x)[:-1, None]
+        left = sum(c[:-1] * widths**k for k, c in enumerate(coefficients[::-1]))
+        scale = 1 + trajectory.peaks(max(derivative, 1)).max()
+        np.testing.assert_allclose(left, path(knots, derivative), atol=1e-9 * scale)
+    for derivative in (1, 2):
+        scale = 1 + trajectory.peaks(derivative).max()
+        still = trajectory.position(trajectory.times, derivative)
+        np.testing.assert_allclose(still, 0, atol=1e-9 * scale)
+
+
+@given(
+    points=st.lists(POINT, min_size=4, max_size=8),
+    gaps=st.lists(st.floats(0.1, 2), min_size=8, max_size=8),
+)
+def test_peaks_are_those_of_dense_samples_for_any_cubic_spline(points, gaps) -> None:
+    """A curved spline of scipy's, whose speed peaks inside the pieces."""
+    times = np.cumsum(gaps[: len(points)])
+    spline = CubicSpline(times - times[0], points)
+    straight = Trajectory.through(points[0], 0.0, [Phase("all", points[-1], 1.0, 0.0)])
+    curved = replace(straight, path=spline, times=np.array([0.0, spline.x[-1]]))
+    dense = np.linspace(0, spline.x[-1], 4001)
+    for derivative in (1, 2):
+        sampled = np.linalg.norm(spline(dense, derivative), axis=1).max()
+        peak = curved.peaks(derivative)[0]
+        bend = spline.x[-1] / 4000 * np.abs(spline(dense, derivative + 1)).max()
+        assert sampled * (1 - 1e-9) <= peak <= sampled + 2 * bend + 1e-9
+
+
+def test_before_and_after_the_hand_rests() -> None:
+    trajectory = Trajectory.through(np.zeros(3), 0.08, [Phase("go", np.ones(3), 2.0, 0.0)])
+    np.testing.assert_allclose(
+        trajectory.position([-1.0, 3.0]), [np.zeros(3), np.ones(3)], atol=1e-14
+    )
+    np.testing.assert_allclose(trajectory.position([-1.0, 3.0], 1), 0, atol=1e-12)
+
+
+def test_fingers_and_names_by_time() -> None:
+    still = np.zeros(3)
+    phases = [Phase("wait", still, 1.0, 0.08), Phase("close", still, 0.5, 0.0)]
+    both = Trajectory.through(still, 0.08, [*phases, Phase("rest", still, 1.0, 0.0)])
+    np.testing.assert_allclose(both.opening([0.5, 1.0, 1.25, 1.5, 9.0]), [0.08, 0.08, 0.04, 0, 0])
+    assert both.phase_at(np.array([0.0, 1.0, 1.4, 2.5])) == ["wait", "close", "close", "rest"]
+    assert (both.start_of("close"), both.duration) == (1.0, 2.5)
+    with pytest.raises(KeyError):
+        both.start_of("fly")

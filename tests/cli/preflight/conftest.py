@@ -1,0 +1,65 @@
+"""The recordings of tests/recording, looked at once."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from sling2sim2real.cli.preflight.check import Look, band_of, look_at
+from sling2sim2real.recording.build import Checked
+from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.settings import Params
+from sling2sim2real.settings.lab import BandParams
+from tests.project import DEFAULTS
+from tests.recording.conftest import blind, masked, params, seen
+
+__all__ = ["blind", "masked", "params", "seen"]
+PROCESSED: dict[str, Checked] = {}
+
+
+def processed_once(pull: Pull, band: BandParams, params: Params, weighed: bool) -> Checked:
+    """`Checked.of`, which for equal pulls of a file is worked out once in all these tests."""
+    if params.cloud.mask == "folder":  # the masks may be others
+        return Checked.of(pull, band, params, weighed)
+    settings = params.model_dump(exclude={"run", "bands"})
+    key = repr((pull.recording.path, pull.recording.sha256, pull.number, band, settings, weighed))
+    if key not in PROCESSED:
+        PROCESSED[key] = Checked.of(pull, band, params, weighed)
+    return PROCESSED[key]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def each_pull_is_processed_once() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            "sling2sim2real.cli.preflight.check.Checked", SimpleNamespace(of=processed_once)
+        )
+        yield
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A project's folder whose window suits the small recordings."""
+    text = DEFAULTS.read_text()
+    for old, new in (
+        ("duration: 9.0", "duration: 3.6"),
+        ("samples: 300", "samples: 120"),
+        ("tail: 0.7", "tail: 0.5"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "params.yaml").write_text(text)
+    return tmp_path
+
+
+@pytest.fixture(scope="session")
+def looked(seen, params) -> Look:
+    """A recording that can be used."""
+    return look_at(seen[0], params, band_of(params))
+
+
+@pytest.fixture(scope="session")
+def refused(blind, params) -> Look:
+    """A recording whose pictures show no band."""
+    return look_at(blind[0], params, band_of(params))

@@ -1,0 +1,219 @@
+"""What `sling check` says of recordings whose truth is a formula."""
+
+import json
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from sling2sim2real.base.errors import UserError, printable
+from sling2sim2real.cli.preflight.check import band_of, look_at
+from sling2sim2real.cli.preflight.command import check
+from sling2sim2real.cli.preflight.facts import BandFacts
+from sling2sim2real.cli.preflight.report import CheckReport
+from sling2sim2real.recording.checks.finding import Finding
+from tests.hostile import MARKUP
+from tests.project import with_
+from validation.recordings.bag import (
+    HAND,
+    RADIUS,
+    SENSOR,
+    START,
+    Truth,
+    blind_bag,
+    edit,
+    head,
+    write_bag,
+)
+
+
+def abouts(report) -> set[str]:
+    return {caution.about for caution in report.cautions}
+
+
+def test_the_report_of_a_good_recording(looked, seen) -> None:
+    report, truth = looked.report, seen[1]
+    assert report.usable
+    content = json.loads(report.to_json())
+    signals = content["signals"]
+    assert signals["release_s"] == pytest.approx(truth.release, abs=1e-3)
+    assert abs(signals["release_s"] - truth.release) < 4 * signals["release_error_s"]
+    assert abs(signals["grasp_s"] - truth.grasp) <= signals["grasp_error_s"]
+    peak = np.linalg.norm(truth.force(truth.release - 0.01))
+    assert signals["peak_force_n"] == pytest.approx(peak, rel=0.02)
+    assert content["cloud"]["taut_coverage"] > 0.9
+    assert content["cloud"]["taut_offset_m"] == pytest.approx(RADIUS, abs=0.002)
+    sizes = {"diameter_m": 0.010, "rest_length_m": 0.52, "mass_kg": None}
+    source = "assumed: --diameter 0.01 and --rest-length 0.52; give yours, or --band"
+    assert content["band"] == sizes | {"source": source}
+    roles = {row["role"]: row for row in content["topics"] if row["role"]}
+    assert {"wrench", "pose", "gripper", "color", "depth"} <= set(roles)
+    assert roles["wrench"]["topic"] == "/ft/wrench" and roles["wrench"]["why"]
+    assert roles["color"]["rate"] == pytest.approx(15, rel=0.01)
+    assert set(content["delays"]) == {"pose", "camera"}
+    text = report.to_text()
+    assert "/ft/wrench" in text and "left tip off" in text and "can be used" in text
+
+
+def test_the_verdict_and_its_cautions_come_first(looked) -> None:
+    cautions = [Finding("gap", "the force has a gap", "record it again")]
+    for problem, verdict in ((None, "can be used, but:"), ("no force", "cannot be used: no force")):
+        report = replace(looked.report, cautions=cautions, problem=problem)
+        lines = report.to_text().splitlines()
+        assert lines[2:4] == [verdict, "  - the force has a gap: record it again"]
+        basis = lines.index("it rests on")
+        assert lines[basis + 1].startswith("  force: at most ")
+        assert lines[basis + 2].startswith("  motion: loading 25 to 38 cm at 0.23 m/s, pause ")
+        assert lines[basis + 3].startswith("  not in it, so known by a prior alone: softening and")
+        assert lines[basis + 4].startswith("  pictures: the band is in ")
+        assert "0.52 m long, assumed: --diameter 0.01 and --rest-length" in lines[basis + 5]
+        assert lines[basis + 6].startswith(
+            "  no mass given, so its weight and the force's direction"
+        )
+        assert basis < lines.index("signals") < lines.index("chosen")
+    pulls = [replace(looked.report.row, number=number) for number in (1, 2)]
+    lines = replace(looked.report, pulls=pulls, cautions=cautions).to_text().splitlines()
+    assert lines[2] == "pull 1 of 2: can be used, but:" and lines[5].split()[:2] == [
+        "pull",
+        "grasp",
+    ]
+
+
+def test_json_has_a_row_for_each_picture_only_where_asked(looked) -> None:
+    assert "coverage" not in json.loads(looked.report.to_json())
+    rows = json.loads(looked.report.to_json(frames=True))["coverage"]
+    assert rows == [asdict(row) for row in looked.report.coverage]
+    assert len(rows) == looked.report.cloud.frames
+
+
+def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
+    """No gripper, a slow camera, a lost second of force, a short pause, too much force."""
+
+    def lose(stamp: int, message) -> bool:
+        return not 1.3 < (stamp - START) * 1e-9 < 1.35
+
+    path = tmp_path / "poor.mcap"
+    write_bag(path, Truth(noise=0.6), rate=500, without=("gripper",), change=edit(wrench=lose))
+    report = look_at(path, with_(params, "setup", max_force=15.0), band_of(params)).report
+    assert report.usable and report.verdict == "can be used, but:"
+    output = {"gripper", "picture_rate", "force_rate", "gap", "pause", "max_force", "noise"}
+    assert output <= abouts(report)
+    text = report.to_text()
+    for caution in report.cautions:
+        assert caution.cure and "\n" not in str(caution) and str(caution) in text
+
+
+def test_a_clock_ahead_is_shown_with_its_sign(tmp_path, params) -> None:
+    """Stamps of the pose that are 0.2 s too large."""
+
+    def ahead(stamp: int, message) -> None:
+        message.header = head(stamp + 200_000_000, message.header.frame_id)
+
+    path = blind_bag(tmp_path, change=edit(pose=ahead))
+    rows = {row.role: row for row in look_at(path, params, band_of(params)).report.topics}
+    assert rows["pose"].clock_offset == pytest.approx(0.2, abs=0.001)
+    assert rows["wrench"].clock_offset == 0
+    assert rows["depth"].clock_offset == pytest.approx(-0.0155, abs=0.001)  # it takes a while
+
+
+def test_each_chosen_topic_stands_apart_from_its_role(looked) -> None:
+    """Also where one topic plays two roles."""
+    topics = [replace(row, role=row.role and "wrench, pose") for row in looked.report.topics]
+    assert "  wrench, pose  /ft/wrench  (" in replace(looked.report, topics=topics).to_text()
+
+
+def test_a_disk_that_is_full_is_one_line(seen, params, tmp_path, monkeypatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: full())
+    with pytest.raises(UserError, match="out.png: cannot be written .No space left"):
+        check(seen[0], params, sheet=tmp_path / "out.png")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_report_of_a_bad_recording(tmp_path, params) -> None:
+    path = blind_bag(tmp_path, without=("wrench",))
+    report = look_at(path, params, band_of(params)).report
+    assert not report.usable
+    assert "no force" in json.loads(report.to_json())["problem"]
+    assert "cannot be used: no force" in report.to_text()
+    assert "/arm/current_pose" in report.to_text()
+
+
+def test_a_report_without_pictures_of_the_band_has_its_signals(refused, blind) -> None:
+    report, truth = refused.report, blind[1]
+    assert not report.usable and not report.phases and not report.extrinsics
+    assert report.signals.release_s == pytest.approx(truth.release, abs=2e-3)
+    assert "release_s" in report.to_text() and json.loads(report.to_json())["signals"]
+
+
+def test_the_band_of_a_command_line(params) -> None:
+    assert band_of(params, "band1").params is params.bands["band1"]
+    assert "band1" in band_of(params, "band1").source and band_of(params, "band1").weighed
+    assert not band_of(params).weighed
+    band = band_of(params, mass=0.2, diameter=0.008)
+    assert band.weighed and (band.params.mass, band.params.diameter) == (0.2, 0.008)
+    assert band.params.rest_length == 0.52 and "assumed: --rest-length 0.52" in band.source
+    assert band_of(params, diameter=0.008, rest_length=0.5).source == "given"
+    for sizes, words in (
+        ({"name": "red"}, "--band red: not in params.yaml, which has band1"),
+        ({"name": "band1", "diameter": 0.01}, "leave these out"),
+        ({"rest_length": 0.2}, "--rest-length 0.2: must be longer"),
+    ):
+        with pytest.raises(UserError, match=words):
+            band_of(params, **sizes)
+
+
+def test_without_a_mass_nothing_is_judged_by_one(tmp_path, params) -> None:
+    """A heavy band presses the hand down by half of its weight: no sensor is turned."""
+    truth, mass = Truth(), 0.3
+    weight = (HAND * SENSOR).inv().apply([0.0, 0.0, -9.81 * mass / 2])
+
+    def heavy(stamp: int, message) -> None:
+        if truth.holds((stamp - START) * 1e-9):
+            force = message.wrench.force
+            force.x, force.y, force.z = weight + [force.x, force.y, force.z]
+
+    path = blind_bag(tmp_path, change=edit(wrench=heavy))
+    for given, said in ((None, False), (mass, False), (0.03, True)):
+        report = look_at(path, params, band_of(params, mass=given)).report
+        assert ("direction" in abouts(report)) == said
+        assert ("no mass given" in report.to_text()) == (given is None)
+
+
+def test_outputs_are_refused_before_anything_is_read(tmp_path, params) -> None:
+    missing = tmp_path / "missing.mcap"
+    (tmp_path / "folder.png").mkdir()
+    for options, words in (
+        ({"sheet": tmp_path / "no" / "out.png"}, "there is no folder .*no, make it first"),
+        ({"sheet": tmp_path / "folder.png"}, "is a folder"),
+        ({"sheet": tmp_path / "out.jpg"}, "must end with .png"),
+        ({"rrd": tmp_path / "no" / "out.rrd"}, "there is no folder"),
+        ({"rrd": missing}, "must end with .rrd"),
+    ):
+        with pytest.raises(UserError, match=words):
+            check(missing, params, **options)
+    with pytest.raises(UserError, match="no such file"):
+        check(missing, params, sheet=tmp_path / "out.png")
+    assert [p.name for p in tmp_path.iterdir()] == ["folder.png"]
+
+
+def test_the_whole_command(seen, params, tmp_path) -> None:
+    sheet = tmp_path / "out.png"
+    text, status = check(seen[0], params, band="band1", as_json=True, sheet=sheet)
+    content = json.loads(text)
+    assert status == 0 and content["usable"] and sheet.exists()
+    assert str(sheet) in content["written"][0] and "band1" in content["band"]["source"]
+
+
+@pytest.mark.parametrize("name", MARKUP)
+def test_a_name_of_any_letters_has_nothing_that_a_terminal_obeys(name: str) -> None:
+    """Also where an error names what lies beside the recording."""
+    problem, written = f"{name}.masks: there is no such folder", [f"{name}.png: six moments"]
+    band = BandFacts(0.01, 0.5, "given", 0.03)
+    lines = CheckReport(name, "", problem, [], [], band=band, written=written).to_text().split("\n")
+    assert all(line.isprintable() for line in lines)
+    shown = printable(name)
+    assert f"cannot be used: {shown}.masks: there is no such folder" in lines
+    assert f"{shown}.png: six moments" in lines

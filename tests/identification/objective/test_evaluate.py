@@ -1,0 +1,122 @@
+"""Batches of parameters: slicing, workers, failures."""
+
+from dataclasses import replace
+from threading import Barrier
+
+import numpy as np
+import pytest
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.identification.objective.evaluate import Evaluator
+from sling2sim2real.identification.objective.loss import TERMS, EpisodeLoss
+from sling2sim2real.settings import load
+from sling2sim2real.simulator.parameters import THETA
+from tests.identification.search import toy
+from tests.project import DEFAULTS
+from validation.synthetic import recorded_yardstick
+
+PARAMS = load(DEFAULTS)
+EPISODE = toy.episode()
+OFFSET, PULL = "poissons_ratio", "youngs_modulus"  # what the toy takes them for
+BOX = SearchBox(
+    (OFFSET, PULL),
+    np.array([0.0, 0.1]),
+    np.array([0.01, 10]),
+    np.array([0, 1], bool),
+    fixed=dict.fromkeys({*THETA} - {OFFSET, PULL}, 0.0),
+)
+
+
+def simulate(sling, episode, parameters, device):
+    """A band `offset` away and a force `pull`; beyond 8 mm it fails, beyond 9 N it is NaN."""
+    assert (sling, episode, device) == (toy.SLING, EPISODE, "cpu")
+    offset, pull = parameters.column(OFFSET), parameters.column(PULL)
+    result = toy.rollouts(episode, count=len(parameters))
+    result.center_line[..., 2] -= offset[:, None, None].astype(np.float32)
+    result.force[..., 0] = np.where(pull > 9, np.nan, pull)[:, None]
+    result.failure = ["too far" if far else None for far in offset > 0.008]
+    return result
+
+
+def evaluator(workers: int = 1, **options) -> Evaluator:
+    loss = toy.loss_of(EPISODE, weights={"geom": 1.0, "force": 0.5, "work": 1.0})
+    options = {"workers": workers, "simulate": simulate, **options}
+    return Evaluator(EPISODE, toy.SLING, loss, BOX, **options)
+
+
+def test_losses_of_a_batch() -> None:
+    """Physical values in, weighted sum out; the unit cube is what was asked."""
+    unit = np.array([[0.5, 0.5], [0.0, 0.0]])
+    evaluation = evaluator(1)(unit)
+    np.testing.assert_array_equal(evaluation.unit, unit)
+    np.testing.assert_allclose(evaluation.theta, [[0.005, 1.0], [0.0, 0.1]])
+    np.testing.assert_allclose(evaluation.terms["geom"], [0.5, 0.0], atol=0.01)
+    np.testing.assert_allclose(evaluation.terms["force"], [1.0, 0.1])
+    np.testing.assert_allclose(
+        evaluation.total, evaluation.terms["geom"] + 0.5 * evaluation.terms["force"]
+    )
+    assert evaluation.failure == [None, None]
+
+
+def test_the_number_of_workers_and_devices_changes_nothing() -> None:
+    """Rows in their order, failures too; some devices may find nothing to do."""
+    for count, workers, devices in ((67, 3, 1), (67, 1, 2), (17, 1, 2), (2, 1, 3), (1, 1, 3)):
+        unit = np.random.default_rng(1).random((count, 2))
+        serial, several = evaluator()(unit), evaluator(workers, devices=["cpu"] * devices)(unit)
+        np.testing.assert_array_equal(serial.theta, several.theta)
+        np.testing.assert_array_equal(serial.total, several.total)
+        assert serial.failure == several.failure
+        for name in TERMS:
+            np.testing.assert_array_equal(serial.terms[name], several.terms[name])
+        assert count < 67 or 0 < sum(reason is not None for reason in serial.failure) < count
+
+
+def test_devices_share_a_batch_evenly_and_at_once() -> None:
+    """Each of two waits for the other, and would do so forever if they took turns."""
+    both, requested = Barrier(2, timeout=60), {}
+
+    def simulate_on(sling, episode, parameters, device):
+        requested[device] = len(parameters)
+        both.wait()
+        return simulate(sling, episode, parameters, "cpu")
+
+    evaluation = evaluator(devices=("cpu", "cpu:1"), simulate=simulate_on)(np.full((11, 2), 0.5))
+    assert requested == {"cpu": 6, "cpu:1": 5} and np.isfinite(evaluation.total).all()
+
+
+def test_what_a_device_raises_is_raised() -> None:
+    def broken(sling, episode, parameters, device):
+        raise UserError(f"{device}: out of memory")
+
+    with pytest.raises(UserError, match="out of memory"):
+        evaluator(devices=["cpu", "cpu"], simulate=broken)(np.full((3, 2), 0.5))
+
+
+def test_nor_does_either_where_a_law_adds_its_own_axes() -> None:
+    """Those of the law rubber, each of which changes the loss."""
+    sling, recorded = recorded_yardstick(PARAMS)
+    sling = replace(sling, law="rubber")
+    box = SearchBox.of_method(PARAMS, "least_squares")
+    unit = np.random.default_rng(1).random((20, box.dimension))  # more than a slice
+    unit[1:3] = unit[0]
+    unit[1, box.names.index("mooney_share")] += 0.1
+    unit[2, box.names.index("relaxation")] += 0.1
+    unit[:3] %= 1
+    evaluations = []
+    loss = EpisodeLoss.of(PARAMS, "least_squares", recorded, sling)
+    for workers, devices in ((1, ["cpu"]), (2, ["cpu"]), (1, ["cpu", "cpu"])):
+        evaluate = Evaluator(recorded, sling, loss, box, workers=workers, devices=devices)
+        evaluations.append(evaluate(unit))
+    assert evaluations[0].failure == evaluations[1].failure == evaluations[2].failure
+    assert np.isfinite(evaluations[0].total[:3]).all() and len(set(evaluations[0].total[:3])) == 3
+    for name in TERMS:
+        for other in evaluations[1:]:
+            np.testing.assert_array_equal(evaluations[0].terms[name], other.terms[name])
+
+
+def test_failures_are_infinite_and_have_a_reason() -> None:
+    evaluation = evaluator(2)(np.array([[0.9, 0.5], [0.5, 0.999], [0.5, 0.5]]))
+    assert evaluation.failure == ["too far", "the loss is not finite", None]
+    np.testing.assert_array_equal(np.isinf(evaluation.total), [True, True, False])
+    assert np.isnan(evaluation.terms["geom"][:2]).all()

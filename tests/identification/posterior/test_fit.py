@@ -1,0 +1,246 @@
+"""The fit finds SciPy's bounded minimum on curves that need no simulator."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sling2sim2real.identification.posterior import fit as module
+from sling2sim2real.identification.posterior.fit import BINNED, NoFit, fit
+from sling2sim2real.identification.posterior.identify import birge_ratio, leave_one_out
+from sling2sim2real.identification.posterior.launches import LaunchExpansion
+from sling2sim2real.identification.posterior.sampling import samples_around
+from tests.identification.posterior.toy import SIZE, Curve, curve, least, slopes, space
+
+TRUE = np.array([8.0, 9.0, 3.0]) * SIZE
+START = np.array([7.0, 7.0, 4.0]) * SIZE
+
+
+def curves(count: int, noise: float = 0.1, seed: int = 0, **options) -> list[Curve]:
+    rng = np.random.default_rng(seed)
+    return [Curve(curve(TRUE) + rng.normal(0, noise, 40), **options) for _ in range(count)]
+
+
+def away(result, phi: np.ndarray) -> float:
+    """In standard deviations given the other coordinates."""
+    return np.abs((result.phi - phi) * np.sqrt(np.diag(result.hessian))).max()
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_it_finds_scipys_minimum(count):
+    seen, box = curves(count), space()
+    result = fit(seen, box, START)
+    best = least(seen, box, START)
+    assert result.settled and away(result, best) < 0.05
+    assert len(result.expansions) == count and result.nuisances.shape == (count, 3)
+    np.testing.assert_allclose(
+        result.hessian, sum(expansion.hessian for expansion in result.expansions)
+    )
+
+
+def test_a_bound_holds_the_mode_and_the_others_give_way(monkeypatch):
+    """A minimum beyond zero: at zero, and the rest where SciPy's bounded minimum has it."""
+    monkeypatch.setattr(module, "STILL", 0.05)
+    seen = [Curve(curve(np.array([8.0, 9.0, -0.5]) * SIZE))]
+    box = space()
+    result = fit(seen, box, START)
+    assert result.settled and result.phi[2] == 0.0 and result.gradient[2] < 0
+    assert away(result, least(seen, box, START)) < 0.05
+    assert all(np.all(phi >= 0) for phi in seen[0].requested)
+
+
+def test_samples_lie_around_the_mode_and_fall_off_from_a_bound():
+    """What a settled fit left of its last step moves none; what leads out of bounds does."""
+    box, result = space(), fit(curves(1), space(), START)
+
+    def drawn(phi: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+        at = replace(result, phi=phi, gradient=gradient)
+        return samples_around(at, box, 1.0, np.random.default_rng(0))
+
+    left = np.sqrt(np.diag(result.hessian))
+    np.testing.assert_array_equal(drawn(result.phi, left), drawn(result.phi, 0 * left))
+    ends = result.phi * [1, 1, 0], np.array([0, 0, -4]) * left
+    flat, steep = (drawn(ends[0], slope)[:, 2].mean() for slope in (0 * left, ends[1]))
+    assert 0 < steep < flat / 2
+
+
+def test_a_prior_pulls_as_far_as_scipy_says():
+    seen, box = curves(1, sigma=1.0), space(expected=np.array([8.0, 15.0, 3.0]), spread=0.5)
+    result, free = fit(seen, box, START), fit(seen, space(), START)
+    assert away(result, least(seen, box, START)) < 0.05
+    assert result.phi[1] > free.phi[1] + 2 * SIZE[1]
+    gap = result.phi - box.expected
+    assert result.misfit == pytest.approx(
+        result.expansions[0].misfit + np.sum(gap**2 * box.precision)
+    )
+
+
+def test_launches_count_as_a_recording_does():
+    first, second = curves(2)
+    result = fit([first], space(), START, launches=Launches(second))
+    assert away(result, least([first, second], space(), START)) < 0.05
+
+
+class Launches:
+    """A curve's samples as launches, which fail where `fails` says so; it keeps what it told."""
+
+    def __init__(self, of: Curve, fails=lambda phi: False) -> None:
+        self.of, self.fails, self.told = of, fails, []
+
+    def expand(self, points, phi, steps) -> LaunchExpansion:
+        left, design = self.of.seen - curve(phi), slopes(phi) / self.of.sigma
+        if self.fails(phi):
+            left, design = np.full_like(left, np.nan), 0 * design
+        self.told.append(LaunchExpansion(left, np.full(40, self.of.sigma), design))
+        return self.told[-1]
+
+
+def test_a_step_into_failing_launches_is_taken_shorter():
+    """As one into a recording's failure: what they no longer cost is no reward."""
+    first, second = curves(2)
+    fit([first], space(), START, launches=Launches(second))
+    there, again = first.requested[1], curves(2)[0]
+    launches = Launches(second, lambda phi: np.allclose(phi, there, atol=0.2 * SIZE))
+    result = fit([again], space(), START, launches=launches)
+    assert launches.told[1].failed.all() and launches.told[1].misfit == 0
+    assert not result.launches.failed.any()
+    assert away(result, least([first, second], space(), START)) < 0.05
+    went, goes = (np.linalg.norm((again.requested[k] - START) / SIZE) for k in (1, 2))
+    assert goes < 0.8 * went
+
+
+def test_launches_that_fail_at_the_start_count_once_they_land():
+    first, second = curves(2)
+    launches = Launches(second, lambda phi: phi[1] < 8 * SIZE[1])
+    result = fit([first], space(), START, launches=launches)
+    assert launches.told[0].failed.all() and not result.launches.failed.any()
+    assert away(result, least([first, second], space(), START)) < 0.05
+
+
+def test_the_fit_keeps_the_launches_of_its_mode():
+    """Not those of a step that was tried last and did not get nearer."""
+    first, second = curves(2)
+    launches = Launches(second)
+    result = fit([first], space(), START, launches=launches)
+    np.testing.assert_array_equal(result.launches.left, second.seen - curve(result.phi))
+
+
+def test_a_step_into_failure_is_taken_shorter():
+    """From START the first step goes where the simulation fails; the minimum does not."""
+    free = curves(1)
+    fit(free, space(), START)
+    first = free[0].requested[1]
+    seen = curves(1, fails=lambda phi: np.allclose(phi, first, atol=0.2 * SIZE))
+    result = fit(seen, space(), START)
+    assert away(result, least(seen, space(), START)) < 0.05
+    assert (
+        np.allclose(seen[0].requested[1], first)
+        and len(seen[0].requested) > len(free[0].requested) - 1
+    )
+    went, goes = (np.linalg.norm((seen[0].requested[k] - START) / SIZE) for k in (1, 2))
+    assert goes < 0.8 * went  # at once, not by and by
+
+
+def test_a_start_that_fails_says_so():
+    with pytest.raises(NoFit, match="toy: the simulation at the start of the fit fails: it broke"):
+        fit(curves(1, fails=lambda phi: True), space(), START)
+
+
+def test_it_settles_only_where_the_steps_end(monkeypatch):
+    assert fit(curves(1), space(), START).settled
+    monkeypatch.setattr(module, "ITERATIONS", 2)
+    cut = fit(curves(1), space(), START)
+    assert not cut.settled and cut.steps == 2
+
+
+def test_it_is_not_settled_where_it_is_stuck():
+    """Everything but its start fails: its damped steps get short, and the minimum stays away."""
+    stuck = fit(curves(1, fails=lambda phi: not np.allclose(phi, START)), space(), START)
+    assert not stuck.settled and stuck.steps < module.ITERATIONS
+    np.testing.assert_array_equal(stuck.phi, START)
+
+
+class Coarse(Curve):
+    """Wide differences lead it astray."""
+
+    def expand(self, points, phi, steps, *others) -> SimpleNamespace:
+        result = super().expand(points, phi, steps, *others)
+        if np.any(np.abs(steps) > SIZE / 2):
+            result.gradient = -result.gradient
+        return result
+
+
+def test_a_fit_that_is_stuck_goes_on_by_finer_differences_and_bins_sorted_anew():
+    (plain,), box = curves(1), space()
+    astray = Coarse(plain.seen)
+    result = fit([astray], box, START)
+    assert result.settled and away(result, least([plain], box, START)) < 0.3
+    assert astray.retained.count(None) == BINNED + 1
+
+
+def test_bins_are_kept_after_the_first_iterations(monkeypatch):
+    """Or the density would change its form with each step."""
+    monkeypatch.setattr(module, "STILL", 0.0)
+    seen = curves(1)
+    fit(seen, space(), START)
+    assert seen[0].retained[:BINNED] == [None] * BINNED and BINNED in seen[0].retained[BINNED:]
+    assert None not in seen[0].retained[BINNED:]
+
+
+def test_no_step_is_longer_than_said(monkeypatch):
+    monkeypatch.setattr(module, "LONGEST", 1.0)
+    seen = curves(1)
+    fit(seen, space(), START)
+    moved = np.abs(np.diff(seen[0].requested[: BINNED + 1], axis=0)) / SIZE
+    assert moved.max() == pytest.approx(1.0)
+
+
+def test_progress_tells_of_each_nearer_expansion():
+    summary = []
+    result = fit(curves(1), space(), START, progress=summary.append)
+    assert summary[-1].misfit == result.misfit and summary[0].misfit > 10 * result.misfit
+
+
+def test_finite_differences_stay_within_the_upper_bounds():
+    box = space(high=(8.0, 50.0, 50.0))
+    steps = module._steps(box, box.high)
+    assert np.all(steps == -SIZE) and np.all(module._steps(box, box.low) == SIZE)
+
+
+def test_without_a_recording_is_a_fit_without_it():
+    """To first order: recordings that differ by as much as their noise."""
+    seen, box = curves(3), space()
+    result, refit = fit(seen, box, START), fit(seen[1:], box, START)
+    spread = np.sqrt(np.diag(np.linalg.inv(refit.hessian)))
+    summary = leave_one_out(SimpleNamespace(fit=result, coordinates=box), 0)
+    moved = np.array(list(summary["moved"].values()))
+    np.testing.assert_allclose(moved, (refit.phi - result.phi) / spread, atol=0.1)
+    there = seen[0].expand(None, refit.phi, None, None, None).misfit
+    assert summary["misfit"] == pytest.approx(there - result.expansions[0].misfit, abs=0.3)
+
+
+def test_disagreement_is_one_of_alike_recordings_and_grows_with_a_shift():
+    alike = [Curve(curve(TRUE)) for _ in range(3)]
+    assert birge_ratio(fit(alike, space(), START)) == 1.0
+    assert birge_ratio(fit(alike[:1], space(), START)) == 1.0
+    ratios = []
+    for shift in (0.2, 0.4):
+        other = [*alike[:2], Curve(curve(TRUE + shift * SIZE))]
+        ratios.append(birge_ratio(fit(other, space(), START)))
+    assert ratios[0] > 1.5 and ratios[1] == pytest.approx(2 * ratios[0], rel=0.1)
+
+
+def test_disagreement_of_mere_noise_is_one_on_average():
+    """Chi squared over its degrees of freedom, whatever the noise's seed."""
+    squares = []
+    for seed in range(200):
+        first = fit(curves(3, seed=seed), space(), TRUE)
+        total = freedom = 0.0
+        for expansion in first.expansions:
+            inverse = np.linalg.inv(expansion.hessian)
+            total += expansion.gradient @ inverse @ expansion.gradient
+            freedom += 3 * (1 - 1 / 3)
+        squares.append(total / freedom)
+        assert birge_ratio(first) == pytest.approx(max(np.sqrt(squares[-1]), 1.0), rel=0.25)
+    assert np.mean(squares) == pytest.approx(1.0, abs=0.15)

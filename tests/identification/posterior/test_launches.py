@@ -1,0 +1,188 @@
+"""The evidence of launches in a toy whose landings are a closed form."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.identification.posterior import launches
+from sling2sim2real.identification.posterior.launches import (
+    TAPE,
+    LaunchExpansion,
+    LaunchLikelihood,
+    Observed,
+    without_each,
+)
+from sling2sim2real.simulator.model import LaunchHistory, LaunchSetup
+
+STEPS = np.array([1e-3, 1e-3])
+FORGETFUL = LaunchSetup(0.05, 1.0, 0.0, None, 1e-3, 1.0)
+
+
+def toy(sling, setup, theta: np.ndarray, draws: np.ndarray, workers: int) -> SimpleNamespace:
+    """log landing is linear in both coordinates; none from draws above z = 0."""
+    y, z = np.asarray(draws).T
+    landing = np.exp(theta @ [1.0, 0.5]) * y**2 * (1 - z)
+    failure = [None if height <= 0 else "no" for height in z]
+    return SimpleNamespace(landing_y=landing, failure=failure)
+
+
+@pytest.fixture(autouse=True)
+def closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(launches, "launch", toy)
+
+
+def expanded(*observed: Observed, phi=(0.0, 0.0)) -> LaunchExpansion:
+    likelihood = LaunchLikelihood(observed, None, FORGETFUL)
+    return likelihood.expand(lambda phi: phi, np.array(phi), STEPS)
+
+
+def test_the_update_is_the_linear_gaussian_one() -> None:
+    """Landing y^2 (1 - z) e^(a + b/2): d log = 2/y, -1/(1 - z) by the draw, 1 and 1/2 by a, b."""
+    y, z, error, landing = -0.5, -0.2, 0.004, 0.33
+    told = expanded(Observed((y, z), error, landing))
+    here = y**2 * (1 - z)
+    spread = np.hypot(error * np.hypot(2 / y, 1 / (1 - z)), TAPE / landing)
+    gap, design = np.log(landing / here) / spread, np.array([1.0, 0.5]) / spread
+    assert told.left == pytest.approx([np.log(landing / here)])
+    assert told.misfit == pytest.approx(gap**2, rel=1e-3)
+    np.testing.assert_allclose(told.hessian, np.outer(design, design), rtol=1e-3)
+    np.testing.assert_allclose(told.gradient, gap * design, rtol=1e-3)
+    prior = np.diag([4.0, 25.0])
+    moved = np.linalg.solve(prior + told.hessian, told.gradient)
+    variance = np.array([1 / 4, 1 / 25])
+    gain = variance * [1, 0.5] / (variance @ [1, 0.25] + spread**2)  # Kalman's
+    np.testing.assert_allclose(moved, gain * np.log(landing / here), rtol=1e-3)
+
+
+def test_what_is_left_of_launches_at_other_coordinates() -> None:
+    """At the expansion its gap; elsewhere the log is linear. One that fails there is left out."""
+    failing = Observed((-0.5, 0.2), 0.001, 0.3)
+    observed = Observed((-0.5, -0.2), 0.001, 0.31), failing, Observed((-0.6, -0.1), 0.002, 0.4)
+    likelihood, told = LaunchLikelihood(observed, None, FORGETFUL), expanded(*observed)
+    left = likelihood.remaining(np.array([[0.0, 0.0], [0.1, -0.3]]), told)
+    np.testing.assert_allclose(left[0], told.gap[[0, 2]])
+    np.testing.assert_allclose(left[1], left[0] + 0.05 / told.spread[[0, 2]])
+
+
+def test_two_launches_tell_more_than_one_and_their_order_nothing() -> None:
+    near, far = Observed((-0.5, -0.2), 0.001, 0.31), Observed((-0.6, -0.1), 0.0, 0.4)
+    first, second = expanded(near), expanded(far)
+    for both in (expanded(near, far), expanded(far, near)):
+        for name in ("misfit", "hessian", "gradient"):
+            added = getattr(first, name) + getattr(second, name)
+            np.testing.assert_allclose(getattr(both, name), added, rtol=1e-6)
+        assert np.trace(both.hessian) > max(np.trace(first.hessian), np.trace(second.hessian))
+
+
+def test_a_launch_that_fails_at_the_expansion_is_named_and_pulls_nowhere() -> None:
+    good, bad = Observed((-0.5, -0.2), 0.001, 0.31), Observed((-0.5, 0.2), 0.001, 0.31)
+    alone, both = expanded(good), expanded(good, bad)
+    assert both.failed.tolist() == [False, True] and np.isnan(both.left[1])
+    for name in ("misfit", "hessian", "gradient"):
+        np.testing.assert_allclose(getattr(both, name), getattr(alone, name))
+
+
+def test_a_finite_difference_that_fails_takes_no_misfit_away(monkeypatch) -> None:
+    """Its coordinate alone tells nothing; what landed still counts, and pulls by the others."""
+
+    def fragile(sling, setup, theta, draws, workers) -> SimpleNamespace:
+        done = toy(sling, setup, theta, draws, workers)
+        done.landing_y = np.where(theta[:, 1] > 0, np.nan, done.landing_y)
+        return done
+
+    launched = Observed((-0.5, -0.2), 0.001, 0.31)
+    sound = expanded(launched)
+    monkeypatch.setattr(launches, "launch", fragile)
+    told = expanded(launched)
+    assert told.misfit == sound.misfit and not told.failed.any()
+    np.testing.assert_array_equal(told.design[:, 0], sound.design[:, 0] * [1, 0])
+
+
+def test_each_launch_is_of_the_band_that_the_launches_before_it_left(monkeypatch) -> None:
+    """A toy that flies shorter by what was drawn before; the order of the table is that of time."""
+    recorded = replace(FORGETFUL, history=LaunchHistory(1.0, 0.5, 0.45))
+
+    def softened(sling, setup, theta, draws, workers) -> SimpleNamespace:
+        done = toy(sling, setup, theta, draws, workers)
+        return SimpleNamespace(
+            landing_y=done.landing_y * np.exp(-np.array(setup.history.deepest)),
+            failure=done.failure,
+        )
+
+    monkeypatch.setattr(launches, "launch", softened)
+    draws = [(-0.3, -0.4), (-0.4, -0.1), (-0.6, -0.1), (-0.4, -0.2)]  # 0.5, 0.41, 0.61, 0.45 m
+    observed = [Observed(draw, 0.001, 0.3) for draw in draws]
+    likelihood = LaunchLikelihood(observed, None, recorded)
+    told = likelihood.expand(lambda phi: phi, np.zeros(2), STEPS)
+    seen = [0.45, 0.5, 0.5, np.hypot(0.6, 0.1)]
+    assert likelihood.deepest == pytest.approx(seen) and likelihood.after == pytest.approx(seen[-1])
+    each = []
+    for observation, before in zip(observed, seen, strict=True):
+        setup = replace(recorded, history=LaunchHistory(1.0, 0.5, before))
+        single = LaunchLikelihood([observation], None, setup)
+        each.append(single.expand(lambda phi: phi, np.zeros(2), STEPS))
+    np.testing.assert_allclose(told.left, np.concatenate([part.left for part in each]))
+    np.testing.assert_allclose(told.design, np.hstack([part.design for part in each]), rtol=1e-9)
+    assert told.misfit == pytest.approx(sum(part.misfit for part in each))
+    assert np.ptp(told.left) > 0.1
+
+
+def test_launches_run_on_as_many_threads_as_the_fit_has(monkeypatch) -> None:
+    threads = set()
+
+    def counted(sling, setup, theta, draws, workers) -> SimpleNamespace:
+        threads.add(workers)
+        return toy(sling, setup, theta, draws, workers)
+
+    monkeypatch.setattr(launches, "launch", counted)
+    likelihood = LaunchLikelihood([Observed((-0.5, -0.2), 0.001, 0.3)], None, FORGETFUL, workers=5)
+    likelihood.expand(lambda phi: phi, np.zeros(2), STEPS)
+    assert threads == {5}
+
+
+def test_at_the_truth_nothing_pulls() -> None:
+    phi = (0.2, -0.1)
+    landing = float(toy(None, None, np.array([phi]), np.array([[-0.5, -0.2]]), 1).landing_y[0])
+    told = expanded(Observed((-0.5, -0.2), 0.001, landing), phi=phi)
+    assert told.misfit == pytest.approx(0, abs=1e-12)
+    np.testing.assert_allclose(told.gradient, 0, atol=1e-6)
+
+
+def test_a_launch_is_held_against_what_all_else_predicts() -> None:
+    """As Gauss has it when the launch is really left out: here a, b have a prior and another."""
+    near, far = Observed((-0.5, -0.2), 0.001, 0.34), Observed((-0.6, -0.1), 0.0, 0.4)
+    prior = np.diag([40.0, 250.0])
+    both = expanded(near, far)
+    scores = without_each(both, prior + both.hessian, both.gradient)
+    for index, (observation, rest) in enumerate(((near, far), (far, near))):
+        others, alone = expanded(rest), expanded(observation)
+        covariance = np.linalg.inv(prior + others.hessian)
+        slope = alone.design[:, 0]
+        predicted = alone.gap[0] - slope @ covariance @ others.gradient
+        assert scores[index] == pytest.approx(
+            predicted / np.sqrt(1 + slope @ covariance @ slope), rel=1e-6
+        )
+    wider = without_each(both, prior + both.hessian, both.gradient, widened=3.0)
+    assert np.all(np.abs(wider) < np.abs(scores))
+    failed = expanded(near, Observed((-0.5, 0.2), 0.001, 0.31))
+    assert np.isnan(without_each(failed, prior + failed.hessian, failed.gradient)[1])
+
+
+@pytest.mark.parametrize(
+    ("draw", "error", "landing", "words"),
+    [
+        ((-0.3, -0.1), 0.001, 195, "launch: landing_y_m must lie between 0 and 20 m"),
+        ((0.3, -0.1), 0.001, 1.9, "launch: draw_y_m must lie between -20 and 0 m"),
+        ((-0.3, -0.1), -1.0, 1.9, "error: must be from 0 to 1 m"),
+        ((-0.3, float("nan")), 0.001, 1.9, "draw_z_m"),
+        ((0.0, -0.1), 0.001, 1.9, "draw_y_m"),
+        ((-0.3, -0.1), 0.001, 0.0, "landing_y_m"),
+        ((-0.3, -0.1), 0.001, "far", "landing_y_m must be a number of metres, got 'far'"),
+    ],
+)
+def test_no_launch_has_such_a_value(draw, error, landing, words) -> None:
+    with pytest.raises(UserError, match=words):
+        Observed(draw, error, landing)

@@ -1,0 +1,110 @@
+"""Searches of known functions of the unit cube."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import numpy as np
+
+from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.identification.objective.evaluate import Evaluation
+from sling2sim2real.identification.objective.loss import TERMS
+from sling2sim2real.identification.optimizers.cma.multistart import Multistart
+from sling2sim2real.identification.search.build import build
+from sling2sim2real.identification.search.evaluations import Evaluations
+from sling2sim2real.identification.search.loop import search
+from sling2sim2real.identification.search.regions import Region, find_regions
+
+NAMES = ("a", "b", "c", "d", "e")
+CENTRE = np.array([0.3, 0.62, 0.45, 0.8, 0.55])
+BUDGET = SimpleNamespace(
+    seed=1,
+    population=24,
+    generations=12,
+    mutation=(0.5, 1.0),
+    recombination=0.7,
+    k_top=5,
+    k_nn=15,
+    delta=0.1,
+    cma_population=8,
+    cma_rollouts=320,
+)
+
+
+class Evaluate:
+    """Evaluates a function of the unit cube, where each term of the loss is its value."""
+
+    def __init__(
+        self,
+        function: Callable[[np.ndarray], np.ndarray],
+        names: tuple[str, ...] = NAMES,
+        fails: Callable[[np.ndarray], np.ndarray] = lambda unit: unit[:, 0] < 0,
+        weights: dict[str, float] | None = None,
+    ) -> None:
+        self.function, self.fails, self.count = function, fails, 0
+        size = len(names)
+        low, high, linear = np.zeros(size), np.full(size, 10.0), np.zeros(size, bool)
+        self.box = SearchBox(names, low, high, linear)
+        weights = dict.fromkeys(TERMS, 0.0) | (weights or {"geom": 1.0})
+        weighed = [name for name in TERMS if weights[name]]
+        total = lambda terms: sum(weights[name] * terms[name] for name in weighed)  # noqa: E731
+        self.loss = SimpleNamespace(weights=weights, total=total)
+
+    def __call__(self, unit: np.ndarray) -> Evaluation:
+        self.count += 1
+        value = self.function(unit)
+        failed = self.fails(unit)
+        terms = {name: np.where(failed, np.nan, value) for name in TERMS}
+        total = np.where(failed, np.inf, self.loss.total(terms))
+        failure = ["no" if bad else None for bad in failed]
+        return Evaluation(unit, self.box.to_physical(unit), terms, total, failure)
+
+
+def quadratic(centre: np.ndarray, matrix: np.ndarray, **more) -> Evaluate:
+    """The loss is 1 + (u - centre)' matrix (u - centre) in the unit cube."""
+
+    def value(unit: np.ndarray) -> np.ndarray:
+        gap = unit - centre
+        return 1 + np.einsum("ni,ij,nj->n", gap, matrix, gap)
+
+    return Evaluate(value, **more)
+
+
+def rosenbrock(unit: np.ndarray) -> np.ndarray:
+    """Rosenbrock's valley on [-2, 2] an axis, shape (N,); 0 at 0.75 in the cube."""
+    x = 4 * unit - 2
+    return (100 * (x[:, 1:] - x[:, :-1] ** 2) ** 2 + (1 - x[:, :-1]) ** 2).sum(axis=1)
+
+
+def changed(**changes) -> SimpleNamespace:
+    return SimpleNamespace(**{**vars(BUDGET), **changes})
+
+
+def correlated() -> np.ndarray:
+    """Matrix of a valley: two pairs that nearly trade off, as E and nu or s and d do."""
+    matrix = np.diag([40.0, 40.0, 30.0, 30.0, 10.0])
+    matrix[0, 1] = matrix[1, 0] = 38.0
+    matrix[2, 3] = matrix[3, 2] = -27.0
+    return matrix
+
+
+def chain(evaluate, optimizer=BUDGET, names=NAMES) -> tuple[Evaluations, Evaluations, list[Region]]:
+    """Explore, find regions, refine: both histories and the regions."""
+    first, second = optimizer.population * (optimizer.generations + 1), optimizer.cma_rollouts
+    explored = alone("de", evaluate, first, optimizer, names)
+    sizes = {name: getattr(optimizer, name) for name in ("k_top", "k_nn", "delta")}
+    regions = find_regions(explored.unit, explored.total, **sizes)
+    refined = Evaluations("toy", explored.names)
+    several = Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed)
+    search(several, evaluate, refined, rollouts=second)
+    return explored, refined, regions
+
+
+def alone(
+    name: str, evaluate, rollouts: int, optimizer=BUDGET, names=NAMES, **settings
+) -> Evaluations:
+    """The evaluations of a search of one phase by the optimiser of that name."""
+    evaluations = Evaluations("toy", names)
+    settings |= {"seed": optimizer.seed, "population": optimizer.population}
+    algorithm = build(name, len(evaluations.names), rollouts=rollouts, **settings)
+    search(algorithm, evaluate, evaluations, rollouts=rollouts)
+    return evaluations

@@ -1,0 +1,25 @@
+"""Files edited by hand: the report is written as ever, or one clear line names the file."""
+
+import json
+
+import pytest
+
+from pipeline.report import write as writing
+from tests.edited import outcomes
+from tests.report.conftest import BAND, METHOD
+
+pytestmark = pytest.mark.slow
+
+FILES = {
+    "theta": f"data/theta/{BAND}/{METHOD}.json",
+    "regions": f"data/clusters/{BAND}/{METHOD}.json",
+    "policy": f"data/policies/{BAND}/{METHOD}/card.json",
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_any_edit_is_one_line_or_a_report(name, root, params, no_simulation, text_alone) -> None:
+    path = root / FILES[name]
+    content = json.loads(path.read_text())
+    accepted, refused = outcomes(path, content, lambda: writing.write(params, root))
+    assert refused > accepted > 0

@@ -1,0 +1,334 @@
+"""params.yaml is read as it is written, and every mistake in it is one line with the key's path."""
+
+import copy
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.schema import Section
+from sling2sim2real.settings import Params, check, load, parse
+from sling2sim2real.settings.identification import LAWS
+from sling2sim2real.simulator.parameters import THETA
+from tests.project import DEFAULTS, set_methods
+
+TEXT = DEFAULTS.read_text(encoding="utf-8")
+CONTENT = YAML(typ="safe").load(TEXT)
+NOTHING = dict.fromkeys(("geom", "force", "work"), 0)
+ALL_FIXED = {name: CONTENT["parameters"][name]["low"] for name in THETA}
+NARROW = {"bounds": {"poissons_ratio": [0.45, 0.49]}, "fixed": {"poissons_ratio": 0.4}}
+
+
+def leaves(node: object, path: tuple = ()) -> list[tuple[tuple, object]]:
+    """Every (path, value) of the file that is no mapping or list."""
+    if isinstance(node, dict):
+        return [leaf for key, value in node.items() for leaf in leaves(value, (*path, key))]
+    if isinstance(node, list):
+        return [leaf for key, value in enumerate(node) for leaf in leaves(value, (*path, key))]
+    return [(path, node)]
+
+
+def changed(path: tuple, value: object) -> dict:
+    """The content with the value at `path` replaced."""
+    content = copy.deepcopy(CONTENT)
+    node = content
+    for part in path[:-1]:
+        node = node[part]
+    node[path[-1]] = value
+    return content
+
+
+def refusal(content: dict | str) -> str:
+    with pytest.raises(UserError) as error:
+        parse(content) if isinstance(content, str) else check(content)
+    message = str(error.value)
+    assert "\n" not in message
+    return message
+
+
+def test_attributes_are_the_keys_of_the_file() -> None:
+    def compare(node: object, view: object) -> None:
+        if isinstance(node, dict):
+            for key, value in node.items():
+                compare(value, view[key] if isinstance(view, dict) else getattr(view, key))
+        elif isinstance(node, list):
+            for value, entry in zip(node, view, strict=True):
+                compare(value, entry)
+        else:
+            assert view == node
+
+    compare(CONTENT, load(DEFAULTS))
+
+
+def test_the_view_cannot_be_changed() -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        load(DEFAULTS).optimizer.k_top = 2
+
+
+def test_every_number_has_a_range_and_a_type() -> None:
+    numbers = [(path, v) for path, v in leaves(CONTENT) if type(v) in (int, float)]
+    assert len(numbers) > 200
+    for path, value in numbers:
+        for wrong in (-1e30, 1e30, float("nan"), float("inf"), True, "1e-6", None):
+            if wrong is None and (path[2:] == ("k_top",) or path[1:] == ("arm_stiffness",)):
+                continue  # of a method: as if left out; of an arm: it does not give way
+            if isinstance(value, int) and wrong in (-1e30, 1e30):
+                wrong = int(wrong)
+            message = refusal(changed(path, wrong))
+            assert message.startswith(f"params.yaml: {'.'.join(map(str, path))}: must be "), message
+            assert "between" in message
+
+
+def test_every_text_refuses_a_number() -> None:
+    for path in (path for path, value in leaves(CONTENT) if isinstance(value, str)):
+        message = refusal(changed(path, 3))
+        assert message.startswith(f"params.yaml: {'.'.join(map(str, path))}: "), message
+
+
+def test_no_model_has_a_default() -> None:
+    """What a run depends on stands in params.yaml alone: the models are no stage's dependency."""
+
+    def models(base: type) -> list[type]:
+        return [base, *(subclass for sub in base.__subclasses__() for subclass in models(sub))]
+
+    ours = [
+        model for model in models(Section) if model.__module__.startswith("sling2sim2real.settings")
+    ]
+    assert len(ours) > 30
+    for model in ours:
+        optional = {name for name, field in model.model_fields.items() if not field.is_required()}
+        assert optional <= {"preconditioned", "form"}, model  # new, and softens by energy
+
+
+def test_a_rigs_law_has_constants_of_its_own() -> None:
+    band = {**CONTENT["rig"]["bands"]["band1"], "law": "gent"}
+    path = ("rig", "bands", "band1")
+    assert check(changed(path, {**band, "constants": [80]})).rig.bands["band1"].constants == (80,)
+    for wrong in ([5.0], [80.0, 2.0]):
+        message = refusal(changed(path, {**band, "constants": wrong}))
+        expected = f"rig.bands.band1: constants: gent has [15 to 10000], got {wrong}"
+        assert message == f"params.yaml: {expected}"
+
+
+def test_whole_numbers_refuse_fractions_and_numbers_accept_whole_ones() -> None:
+    assert "whole number between 1 and 50, got 2.5" in refusal(changed(("optimizer", "k_top"), 2.5))
+    assert check(changed(("setup", "max_force"), 30)).setup.max_force == 30.0
+
+
+def test_exact_lines() -> None:
+    zero = refusal(changed(("optimizer", "k_top"), 0))
+    assert zero == "params.yaml: optimizer.k_top: must be between 1 and 50, got 0"
+    misspelt = refusal(TEXT.replace(" k_top:", " ktop:"))
+    assert misspelt == "params.yaml: optimizer.ktop: unknown key, the closest known one is k_top"
+    missing = refusal(TEXT.replace("  k_top:", "  # k_top:"))
+    assert missing == "params.yaml: optimizer.k_top: is missing"
+
+
+DIP = {"at": 1.0, "depth": 0.1, "out_time": 1.0, "back_time": 1.0}
+REFUSED = [
+    ("run.rig", [], "run.rig: must list"),
+    ("run.bands", ["band1", "other"], "run.bands: other is not one of band1"),
+    ("run.bands", ["band1", "band1"], "run.bands: lists an entry twice"),
+    ("run.bands", [], "run.bands: must not be empty"),
+    ("run.methods", ["best"], "run.methods: best is not one of"),
+    ("run.ablations.methods", ["sling2sim2real"], "ablations.methods: sling2sim2real is one"),
+    ("run.ablations.bands", ["other"], "run.ablations.bands: other is not one of run.bands"),
+    ("rig.bands", {}, "rig.bands: lacks band1"),
+    ("rig.bands.band1.law", "mooney", "rig.bands.band1.law: must be 'ogden'"),
+    ("rig.bands.band1.constants", [0.4, 2.0, 0.1], "rig.bands.band1: constants: ogden has pairs"),
+    ("rig.bands.band1.spectrum", {"weight": 0.1}, "rig.bands.band1.spectrum.times: is missing"),
+    ("rig.bands.band1_dip.like", "band9", "rig: bands.band1_dip.like: band9 is not one of band1"),
+    ("rig.bands.band1_dip.like", "band2_dip", "band2_dip is itself like band2: name that"),
+    ("rig.bands.band1_dip.viscosity", 0.1, "has the rubber of band1: leave out viscosity"),
+    ("rig.bands.band1_dip.pull", "long", "rig.bands.band1_dip.pull: must be 'paper' or 'info"),
+    (
+        "plan.dips",
+        [DIP | {"deep": 1}],
+        "plan.dips.0.deep: unknown key, the closest known one is dep",
+    ),
+    ("bands.band1_dip.mass", 0.1, "bands.band1_dip.mass: must be that of band1, which rig.bands"),
+    ("run.dips", ["band1"], "run: dips: band1 is one of run.bands already"),
+    ("bands", {"band-1": CONTENT["bands"]["band1"]}, "bands.band-1: a name has"),
+    ("bands.band1.source", "bag", "bands.band1.source: must be 'recording' or 'rig'"),
+    ("parameters.youngs_modulus.low", 1e8, "parameters.youngs_modulus: low must be less"),
+    ("parameters.dynamic_friction", {"low": 0, "high": 1, "scale": "log"}, "above 0"),
+    ("setup.draw_y", [-0.25, -0.45], "setup.draw_y: the first must be less"),
+    ("setup.draw_y", -0.3, "setup.draw_y: must be a list"),
+    ("setup.clamp_direction", [0, 0, 0.5], "setup.clamp_direction: the vector must have"),
+    ("setup.base_to_fork", [0] * 7, "setup.base_to_fork: the quaternion must have"),
+    ("force.cutoff_unit", "kHz", "force.cutoff_unit: must be 'rad/sample'"),
+    ("force", {"cutoff": 3.2, "cutoff_unit": "rad/sample"}, "force: cutoff must be below pi"),
+    ("optimizer.k_nn", 9999, "optimizer: k_nn must be at most"),
+    ("optimizer.cma_rollouts", 4, "optimizer: cma_rollouts must be at least"),
+    ("sling.edges", 25, "sling: edges must be even"),
+    ("loss.median_window", 6, "loss: median_window must be odd"),
+    ("episode.tail", 59.0, "episode: tail must be less"),
+    ("episode.longest", 8.0, "episode: longest must be at least duration"),
+    ("trials.targets", [0.5], "trials.targets: 0.5 lies outside policy.targets"),
+    ("bands", {"measured": CONTENT["bands"]["band1"]}, "bands.measured: data/trials/measured"),
+    ("bands.band1.rest_length", 0.2, "bands.band1.rest_length: 0.2 must be longer than setup."),
+    ("policy.hidden", [], "policy.hidden: must not be empty"),
+    ("loss", 3, "loss: must be a mapping"),
+    ("weather", 3, "weather: unknown key"),
+    ("methods.de.weights", NOTHING, "methods.de.weights: at least one weight"),
+    ("methods.de.search", "cmaes", "methods.de.search: must be multistart, least_squares, de"),
+    ("methods.de.search", "my.module:", "or package.module:Class, got 'my.module:'"),
+    ("methods.no_work.settings", {"rate": 1}, "methods.no_work: settings are for another"),
+    ("methods.de.settings", {"seed": 3}, "methods.de: settings: seed stands under `optimizer`"),
+    ("methods.de", CONTENT["methods"]["de"] | NARROW, "must be between 0.45 and 0.49, got 0.4"),
+    ("methods.least_squares.fixed", {}, "wants `fixed` to name poissons_ratio, dynamic_friction"),
+    ("setup.tool", {"weight": 0.7}, "setup.tool.weight: unknown key, the closest known one is"),
+    ("run.own", ["band1"], "own: band1 is one of run.bands already"),
+    ("methods.de.bounds", {"air_drag": [0.0, 1.0]}, "air_drag is not one of youngs_modulus"),
+    ("methods.de.bounds", {"poissons_ratio": [0.2, 0.4]}, "[low, high] within parameters.poissons"),
+    ("methods.de.settings", {"rate": [1]}, "methods.de.settings.rate: must be a number, true"),
+    ("methods.de.k_top", 3, "methods.de: k_top and covariance are for search: multistart"),
+    ("setup.foot_height", 0.52, "setup.foot_height: must be less than setup.fork_height"),
+    ("setup.draw_z", [-0.52, -0.1], "setup.draw_z: must be above the floor"),
+    ("methods.de.law", "rubber", "methods.de: bounds: mooney_share is missing, [low, high] within"),
+    ("methods.de.fixed", {"poisson": 0.4}, "methods.de.fixed: poisson is not one of youngs_"),
+    ("methods.de.fixed", {"poissons_ratio": 0.2}, "must be between 0.3 and 0.49, got 0.2"),
+    ("methods.de.fixed", ALL_FIXED, "methods.de.fixed: names every parameter, so none is left"),
+]
+
+
+def test_what_is_refused_and_how_it_is_said() -> None:
+    for path, value, expected in REFUSED:
+        message = refusal(changed(tuple(path.split(".")), value))
+        assert message.startswith(f"params.yaml: {path.partition('.')[0]}"), message
+        assert expected in message
+
+
+def test_bands_of_ones_own_are_recorded_and_have_a_list() -> None:
+    content = changed(("run", "own"), ["band3"])
+    for key in ("bands", "rig"):
+        content["run"][key] = ["band1", "band2"]
+    assert refusal(content) == (
+        "params.yaml: run.own: band3 has source: rig, so it belongs under run.bands"
+    )
+    content["bands"]["band3"]["source"] = "recording"
+    assert check(content).run.own == ("band3",)
+    content["run"]["own"], content["run"]["dips"] = [], ["band3"]
+    assert "run.dips: band3 has source: recording: put it under run.own" in refusal(content)
+    del content["run"]["own"]
+    assert "run.own: is missing" in refusal(content)
+
+
+def test_what_a_method_leaves_out_is_as_the_defaults_say() -> None:
+    weights = CONTENT["methods"]["de"]["weights"]
+    method = check(stepped(changed(("methods", "de"), {"weights": weights}))).methods["de"]
+    assert (method.search, method.k_top, method.covariance) == ("multistart", None, True)
+    assert (method.settings, method.fixed, method.bounds) == ({}, {}, {})
+    other = check(changed(("method_defaults", "bounds"), {"poissons_ratio": [0.4, 0.49]})).methods
+    assert other["no_work"].bounds == {"poissons_ratio": (0.4, 0.49)}
+    assert set(other["least_squares"].bounds) == {*LAWS["rubber"]}
+    without = {key: value for key, value in CONTENT.items() if key != "method_defaults"}
+    assert refusal(without) == "params.yaml: method_defaults: is missing"
+    assert refusal(changed(("method_defaults", "k_top"), 0)).startswith(
+        "params.yaml: method_defaults.k_top: must be between 1 and 50"
+    )
+    assert "methods.de: must be a mapping" in refusal(changed(("methods", "de"), 3))
+
+
+def stepped(content: dict) -> dict:
+    """The same with `run.steps` as its methods' searches have them."""
+    run = content["run"]
+    set_methods(content, run["methods"], run["ablations"]["methods"])
+    return content
+
+
+def test_the_steps_of_a_run_are_those_of_its_methods_searches() -> None:
+    assert stepped(changed(("trials", "repeats"), 3))["run"] == CONTENT["run"]
+    assert refusal(changed(("run", "steps", "clusters"), [])) == (
+        "params.yaml: run.steps.clusters: must list those of run.methods whose search has this"
+        " step: [sling2sim2real]"
+    )
+    output = refusal(changed(("methods", "de"), CONTENT["methods"]["bo"]))
+    assert "run.ablations.steps.de: must list those of run.ablations.methods" in output
+    output = refusal(changed(("run", "ablations", "rig"), []))
+    assert "run.ablations.rig: must list those of run.ablations.bands" in output
+
+
+def test_a_methods_regions_need_rollouts() -> None:
+    content = changed(("optimizer", "cma_rollouts"), 100)
+    content["methods"]["no_work"]["k_top"] = 13
+    assert "methods.no_work.k_top: k_top x optimizer.cma_population" in refusal(content)
+
+
+def test_what_a_method_may_ask_for() -> None:
+    base = CONTENT["methods"]["de"]
+    section = {"search": "lab.search:Own", "settings": {"rate": 0.1, "steps": 3, "name": "x"}}
+    whole = stepped(changed(("methods", "de"), base | section))
+    assert check(whole).methods["de"].settings["rate"] == 0.1
+    rubber = {"law": "rubber", "bounds": CONTENT["methods"]["least_squares"]["bounds"]}
+    rubber |= {"fixed": ALL_FIXED | {"softening": 0.0}}  # the rest of what the law adds is left
+    assert len(check(changed(("methods", "de"), base | rubber)).methods["de"].fixed) == 6
+
+
+def test_targets_beyond_the_paper_area_are_refused_though_trained() -> None:
+    text = TEXT.replace("  - 1.425\n  - 2.425\n", "  - 1.0\n  - 3.0\n")
+    assert parse(text).policy.targets == (1.0, 3.0)
+    far = text.replace("  - 1.725\n", "  - 2.8\n")
+    assert "trials.targets: 2.8 lies outside the target on the floor" in refusal(far)
+
+
+def test_broken_yaml_is_refused_with_its_line() -> None:
+    line = TEXT[: TEXT.index("  delta:")].count("\n") + 1
+    for damage in ("delta: 0.1\n  delta:", "delta: [", "delta: ]"):
+        message = refusal(TEXT.replace("delta:", damage))
+        assert message.startswith("params.yaml, line ")
+        assert abs(int(message.split("line ")[1].split(":")[0]) - line) <= 1
+    assert "must hold a mapping" in refusal("")
+
+
+def test_missing_or_unreadable_file(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="nothing.yaml: no such file"):
+        load(tmp_path / "nothing.yaml")
+    (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(UserError, match="binary.yaml: cannot be read"):
+        load(tmp_path / "binary.yaml")
+
+
+JUNK = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=8),
+    st.lists(st.floats(), max_size=8),
+    st.dictionaries(st.text(max_size=5) | st.integers(), st.integers(), max_size=3),
+    st.dates(),
+    st.binary(max_size=4),
+)
+
+
+@given(
+    path=st.sampled_from([path[:n] for path, _ in leaves(CONTENT) for n in (1, 2, 3)]), junk=JUNK
+)
+def test_any_other_value_is_accepted_or_refused_in_one_line(path: tuple, junk: object) -> None:
+    try:
+        assert isinstance(check(changed(path, junk)), Params)
+    except UserError as error:
+        assert "\n" not in str(error)
+
+
+@given(data=st.data())
+def test_any_damaged_text_is_accepted_or_refused_in_one_line(data: st.DataObject) -> None:
+    start = data.draw(st.integers(0, len(TEXT)))
+    end = data.draw(st.integers(start, min(start + 20, len(TEXT))))
+    text = TEXT[:start] + data.draw(st.text(max_size=6)) + TEXT[end:]
+    try:
+        assert isinstance(parse(text), Params)
+    except UserError as error:
+        assert "\n" not in str(error)
+
+
+def test_names_with_control_characters_or_markup_are_refused_in_one_printable_line() -> None:
+    """A prompt and a topic may be any text; what shows them cares for itself."""
+    for place in (("bands",), ("methods",), ("setup",), ("setup", "topics")):
+        value = next(leaf for path, leaf in leaves(CONTENT) if path[: len(place)] == place)
+        for name in ("x\x1b[2J", "<script>", "../x", "a\nb", "$x$"):
+            assert refusal(changed((*place, name), value)).isprintable()

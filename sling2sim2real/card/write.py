@@ -1,4 +1,4 @@
-"""Write reports/bands/<band>/: what is known of one band, for a person and for a program."""
+"""Write a band's card into a folder: what is known of it, for a person and for a program."""
 
 from __future__ import annotations
 
@@ -8,40 +8,43 @@ from pathlib import Path
 import numpy as np
 
 from sling2sim2real.base.files import replacing_folder, write_json, write_text
-from sling2sim2real.base.layout import Layout
 from sling2sim2real.card import figures
 from sling2sim2real.card.animation import animate
 from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.conclusion import Conclusion
-from sling2sim2real.card.inputs import CardInputs, card_inputs
+from sling2sim2real.card.inputs import CardInputs
 from sling2sim2real.card.simulated import simulate
 from sling2sim2real.card.text import card_text
 from sling2sim2real.card.values import boxes
 from sling2sim2real.drawing.page import page
-from sling2sim2real.settings import Params
+
+SIZES = "mass", "diameter", "rest_length"  # kg, m, m
 
 
-def write(params: Params, band: str, method: str, root: str | Path = ".") -> dict:
-    """Write a band's card; return what card.json says. Raises UserError: an input is missing."""
-    inputs = card_inputs(params, band, method, root)
-    episode, setup = inputs.episode, params.setup
-    layout = Layout(Path(root))
-    recording = layout.raw(band) / episode.metadata["input"]["file"]
-    pictures = Pictures.of(recording, episode, setup)
-    simulated = simulate(params, band, method, episode, inputs.theta)
+def write(to: Path, inputs: CardInputs, pictures: Pictures, digest: str | None = None) -> dict:
+    """Write a band's card into the folder `to`; return what card.json says.
 
+    Args:
+        pictures: Of the first pull.
+        digest: Of all that it rests on, in a band's folder.
+
+    Raises:
+        UserError: θ fails in simulation.
+    """
+    episode, params = inputs.episode, inputs.params
+    simulated = simulate(inputs.found, episode)
     concluded = Conclusion.of(inputs, simulated.force)
     card = content(inputs, concluded)
-    with replacing_folder(layout.card(band)) as folder:
+    with replacing_folder(to) as folder:
         figures.camera(folder / "camera.webp", episode, simulated, pictures)
         figures.force(folder / "force.png", episode, simulated)
-        figures.values(folder / "values.png", concluded.values, boxes(params, method))
+        figures.values(folder / "values.png", concluded.values, boxes(params, inputs.method))
         figures.landings(folder / "landings.png", inputs)
-        animate(folder / "animation.webp", episode, simulated, pictures, setup.fork_width)
+        animate(folder / "animation.webp", episode, simulated, pictures, params.setup.fork_width)
         write_text(folder / "README.md", card_text(inputs, concluded))
-        write_json(folder / "card.json", card)
         text = card_text(inputs, concluded, linked=False)
-        write_text(folder / "index.html", page(text, folder, f"{band}: {concluded.verdict}"))
+        write_text(folder / "index.html", page(text, folder, f"{inputs.band}: {card['verdict']}"))
+        write_json(folder / "card.json", card | ({"digest": digest} if digest else {}))
     return card
 
 
@@ -70,7 +73,8 @@ def content(inputs: CardInputs, concluded: Conclusion) -> dict:
         "values": [asdict(value) for value in concluded.values],
         "draws": draws,
         "next": concluded.steps,
-        "theta_file": Layout().theta(inputs.band, inputs.method).as_posix(),
+        "sizes": {name: getattr(inputs.found.band, name) for name in SIZES},
+        "assumed": list(inputs.assumed),
         "recordings": len(inputs.recordings),
         "pulls": len(inputs.episodes),
         "launches": inputs.launches,

@@ -1,4 +1,4 @@
-"""Where the policy of a band and a method lies, and what it says."""
+"""A trained policy on the disk: where it lies, and what it says."""
 
 from __future__ import annotations
 
@@ -49,26 +49,20 @@ class Card(JsonRecord):
     projectile: Projectile | None = None  # of a policy that sees it
 
 
-@dataclass(frozen=True)
-class Stored:
-    """The policy of `method` for `band`.
+class PolicyFiles:
+    """A trained policy by its files.
 
     Attributes:
-        root: Of the project.
+        network: policy.onnx, metres to metres.
+        card_file: What it is, and how its training went (policy/export.py).
     """
 
-    band: str
-    method: str
-    root: Path = Path()
-
-    @property
-    def folder(self) -> Path:
-        """Where its files lie, or would."""
-        return Layout(self.root).policy(self.band, self.method)
+    network: Path
+    card_file: Path
 
     def card(self) -> dict:
         """What its card says (export.card). Raises NotMade: missing, or damaged."""
-        return read_json(made(self.folder / "card.json"), Card).model_dump()
+        return read_json(made(self.card_file), Card).model_dump()
 
     def draws(self, targets: np.ndarray) -> np.ndarray:
         """Draws (y, z) [m], shape (N, 2), for targets [m], (N,).
@@ -78,7 +72,7 @@ class Stored:
         """
         import onnxruntime
 
-        path = made(self.folder / "policy.onnx")
+        path = made(self.network)
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         options.log_severity_level = 4  # what is wrong is said below
@@ -100,5 +94,46 @@ class Stored:
         """Where the projectile starts (y, z) [m], as the policy was trained with."""
         projectile = self.card()["projectile"]
         if projectile is None:
-            raise NotMade(self.folder / "card.json", "lacks the policy's input `projectile`")
+            raise NotMade(self.card_file, "lacks the policy's input `projectile`")
         return projectile["trained_at"]
+
+
+@dataclass(frozen=True)
+class Stored(PolicyFiles):
+    """The policy of `method` for `band`, of a run.
+
+    Attributes:
+        root: Of the project.
+    """
+
+    band: str
+    method: str
+    root: Path = Path()
+
+    @property
+    def folder(self) -> Path:
+        """Where its files lie, or would."""
+        return Layout(self.root).policy(self.band, self.method)
+
+    @property
+    def network(self) -> Path:
+        return self.folder / "policy.onnx"
+
+    @property
+    def card_file(self) -> Path:
+        return self.folder / "card.json"
+
+
+@dataclass(frozen=True)
+class BandPolicy(PolicyFiles):
+    """The policy in a band's folder (api/band_folder.py)."""
+
+    folder: Path
+
+    @property
+    def network(self) -> Path:
+        return self.folder / "policy.onnx"
+
+    @property
+    def card_file(self) -> Path:
+        return self.folder / "policy.json"

@@ -32,6 +32,8 @@ from sling2sim2real.api.settings import Settings
 from sling2sim2real.base.errors import UserError, one_line
 from sling2sim2real.base.files import replacing
 from sling2sim2real.base.fingerprint import fingerprint
+from sling2sim2real.base.layout import NotMade
+from sling2sim2real.episode.episode import Episode
 from sling2sim2real.launching.launches_file import LaunchRow, read_launches
 from sling2sim2real.recording.input.bag import sha256
 from sling2sim2real.recording.masks.folder import masks_beside
@@ -39,7 +41,6 @@ from sling2sim2real.recording.masks.folder import masks_beside
 BANDS = Path("bands")  # in the working folder
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 SIZES = {"mass": "kg, between the clamps", "diameter": "m", "rest_length": "m, between the clamps"}
-USUAL = {"diameter": 0.010, "rest_length": 0.52}  # m, where nothing is given
 LIBRARY = Path(__file__).parents[1]
 RECORDED = ("setup", "episode", "cloud", "force")  # settings that an episode depends on
 
@@ -216,6 +217,14 @@ class BandFolder:
         )
         return self.path / "episodes" / key[:16]
 
+    @property
+    def first_episode(self) -> Episode | None:
+        """That of the first pull, where it is kept."""
+        try:
+            return Episode.load(self.episodes(self.recordings[0]) / "1")
+        except (NotMade, IndexError):
+            return None
+
     @cached_property
     def digest(self) -> str:
         """Of all that θ and the card rest on: recordings, launches, sizes and settings."""
@@ -230,13 +239,15 @@ class BandFolder:
 
 def lab_settings(path: Path = BANDS / "lab.yaml") -> Settings:
     """The library's settings, with what a lab.yaml changes, if there is one. Raises UserError."""
+    return lab_settings_of(read_yaml(path) if path.is_file() else {}, path)
+
+
+def lab_settings_of(content: Mapping[str, Any], path: Path) -> Settings:
+    """The same by what such a file holds, or is to hold."""
     try:
-        return Settings.default(**(read_yaml(path) if path.is_file() else {}))
-    except TypeError as error:  # a key that is no text
-        raise UserError(f"{path}: must hold sections such as `setup:` ({error})") from error
-    except UserError as error:
-        message = str(error)
-        raise UserError(message if str(path) in message else f"{path}: {message}") from error
+        return Settings.default(**content)
+    except (UserError, TypeError) as error:  # or a key that is no text
+        raise UserError(f"{path}: {str(error).removeprefix('settings: ')}") from error
 
 
 def differences(settings: Settings, base: Settings) -> dict[str, Any]:

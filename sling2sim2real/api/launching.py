@@ -9,7 +9,7 @@ import numpy as np
 
 from sling2sim2real.api.arguments import drawn, number
 from sling2sim2real.api.model import Model
-from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.errors import Refused
 from sling2sim2real.launching.surface.aim import landings_within, secants
 from sling2sim2real.launching.trials.spread import landing_intervals
 from sling2sim2real.launching.trials.stretch import stretch_of
@@ -37,10 +37,6 @@ class Hazard:
 
     def __str__(self) -> str:
         return self.what
-
-
-class Refused(UserError):
-    """There is a draw, but no robot should carry it out: it misses, fails or pulls too hard."""
 
 
 @dataclass(frozen=True)

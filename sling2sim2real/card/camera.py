@@ -69,9 +69,7 @@ class Pictures:
         first = self.latest(episode.release_time - BEFORE)
         last = int(np.searchsorted(self.time, episode.release_time + AFTER)) + 1
         chosen = sorted({0, hanging, *range(first, min(last, len(self.time)))})
-        return replace(
-            self, time=self.time[chosen], _taken=[self[number] for number in chosen]
-        )
+        return replace(self, time=self.time[chosen], _taken=[self[number] for number in chosen])
 
     def save(self, folder: Path) -> None:
         """Write them as PNG, losslessly, and their times."""

@@ -15,7 +15,6 @@ from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.phases import NO_UNLOADING, phases_of_hand, unseen
 from sling2sim2real.launching.trials.spread import LEVEL
 from sling2sim2real.quantities import QUANTITIES, rounded
-from sling2sim2real.settings import Params
 
 OUTSIDE = float(ndtri((1 + LEVEL) / 2))  # standard deviations: beyond the interval
 NEARLY = 0.02  # m below the highest that the hand goes: it no longer lifts

@@ -6,7 +6,6 @@ same command goes on. Nothing is kept of a recording that cannot be used.
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -17,7 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sling2sim2real.api.band_folder import SIZES, USUAL, BandFile, BandFolder
+from sling2sim2real.api.arguments import USUAL
+from sling2sim2real.api.band_folder import SIZES, BandFile, BandFolder
 from sling2sim2real.api.identification import (
     METHOD,
     Identification,
@@ -135,9 +135,7 @@ def folder_of(given: Sequence[Path], name: str | None) -> tuple[BandFolder, list
     return folder, files
 
 
-def _file(
-    folder: BandFolder, recordings: Sequence[Path], sizes: Mapping[str, float]
-) -> BandFile:
+def _file(folder: BandFolder, recordings: Sequence[Path], sizes: Mapping[str, float]) -> BandFile:
     """What band.yaml is to hold. Raises UserError."""
     if folder.band_file.is_file():
         return folder.file.with_sizes(sizes)

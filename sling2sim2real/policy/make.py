@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sling2sim2real.base.machine import kind
-from sling2sim2real.base.progress import Progress
+from sling2sim2real.base.progress import Advancing
 from sling2sim2real.launching.surface.landing_map import LandingMap, Launcher, validation
 from sling2sim2real.launching.surface.simulated import SimulatedLandings
 from sling2sim2real.policy.check import check, figures, verdict
@@ -27,7 +27,7 @@ def make_policy(
     theta: dict,
     *,
     asked: Callable[[np.ndarray], dict | None],
-    progress: Progress | None = None,
+    progress: Advancing | None = None,
 ) -> str:
     """Write policy.onnx, card.json, map.parquet and training.parquet; return how it went.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -49,16 +50,18 @@ class Card(JsonRecord):
     projectile: Projectile | None = None  # of a policy that sees it
 
 
-class PolicyFiles:
-    """A trained policy by its files.
+class PolicyFiles(ABC):
+    """A trained policy by its files."""
 
-    Attributes:
-        network: policy.onnx, metres to metres.
-        card_file: What it is, and how its training went (policy/export.py).
-    """
+    @property
+    @abstractmethod
+    def network(self) -> Path:
+        """policy.onnx, metres to metres."""
 
-    network: Path
-    card_file: Path
+    @property
+    @abstractmethod
+    def card_file(self) -> Path:
+        """What it is, and how its training went (policy/export.py)."""
 
     def card(self) -> dict:
         """What its card says (export.card). Raises NotMade: missing, or damaged."""

@@ -1,4 +1,4 @@
-"""Write one band's card: can it be trusted, its values, three draws, pictures, what would help.
+"""Write one band's folder: what `sling aim` and its like need, and a card.
 
     python -m stages.card band1 least_squares
 
@@ -8,15 +8,15 @@ reports/bands/<band>/.
 
 from __future__ import annotations
 
+from pipeline.band_folder import write
 from sling2sim2real.base.layout import Layout
-from sling2sim2real.card.write import write
 from stages.start import run, started
 
 
 def main() -> None:
-    params, band, method = started("band", "method")
-    card = write(params, band, method)
-    print(f"{band} {method}: {card['verdict']}; wrote {Layout().card(band)}/README.md")
+    _, band, method = started("band", "method")
+    card = write(band, method)
+    print(f"{band} {method}: {card['verdict']}; wrote {Layout().card(band)}/card/README.md")
 
 
 if __name__ == "__main__":

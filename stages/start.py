@@ -52,7 +52,7 @@ def started(*names: str) -> tuple[Params, *tuple[str, ...]]:
     except UserError as error:
         if OF_EXPERIMENT in os.environ and Path.cwd() == Path(os.environ["DVC_ROOT"]):
             raise UserError(
-                f"{error}; DVC wrote it there: `sling reset KEY` takes it back, and"
+                f"{error}; DVC wrote it there: `git checkout params.yaml` takes it back, and"
                 " `dvc exp run --temp` leaves params.yaml alone"
             ) from error
         raise
@@ -102,7 +102,7 @@ def remedy(error: NotMade) -> str:
         return ""
     folder, band, method = owner_of_path
     if folder == "raw" and band not in (*load().run.rig, *load().run.dips):
-        return f"`sling add-recording --band {band} FILE.mcap` puts a recording there"
+        return "put the band's FILE.mcap there"
     params = load()
     step = MAKERS.get(folder, folder)
     if folder in OF_A_SEARCH and method in params.methods:

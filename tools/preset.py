@@ -2,8 +2,8 @@
 
     python tools/preset.py large    # as `make large`; further arguments go to `sling flow`
 
-The preset's keys are written into params.yaml, for `git diff` to show and `sling reset` to take
-back (`git checkout reports dvc.lock` for its results); then `sling flow`. Its report is copied to
+The preset's keys are written into params.yaml, for `git diff` to show; `git checkout params.yaml
+reports dvc.lock` takes them and their results back; then `sling flow`. Its report is copied to
 reports/presets/, and `seconds` in reports/run.js is how long it took. Killed, it goes on where it
 was when it is called again, whose time is then that of the rest.
 """
@@ -20,6 +20,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from dvc.utils.serialize import dumps_yaml, parse_yaml_for_update
 from ruamel.yaml import YAML
 
 ROOT = Path(__file__).parents[1]
@@ -29,7 +30,6 @@ from pipeline.report.run import write_run  # noqa: E402
 from sling2sim2real.base import errors  # noqa: E402
 from sling2sim2real.base.errors import UserError  # noqa: E402
 from sling2sim2real.base.files import replacing_folder, write_text  # noqa: E402
-from sling2sim2real.cli.params_file import edited  # noqa: E402
 from sling2sim2real.settings import parse  # noqa: E402
 
 PRESETS = ROOT / "presets"
@@ -49,8 +49,10 @@ def preset(name: str) -> dict:
 
 
 def write_preset(path: Path, changes: dict) -> None:
-    """Write a preset's keys into params.yaml, whose comments stay. Raises UserError."""
-    text = edited(path.read_text(encoding="utf-8"), lambda content: _merge(content, changes))
+    """Write a preset's keys into params.yaml, as DVC would. Raises UserError."""
+    content = parse_yaml_for_update(path.read_text(encoding="utf-8"), str(path))
+    _merge(content, changes)
+    text = dumps_yaml(content)
     parse(text, str(path))
     write_text(path, text)
 

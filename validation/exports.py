@@ -12,8 +12,8 @@ import tempfile
 from importlib.metadata import version
 from pathlib import Path
 
+from pipeline.band_folder import identified
 from sling2sim2real.api.exporting import export
-from sling2sim2real.api.identification import Identification
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.layout import Layout
@@ -59,7 +59,7 @@ def main() -> None:
 def exported(target: str, band: str) -> dict:
     """The card of a band that is exported and replayed. Raises UserError."""
     with tempfile.TemporaryDirectory() as folder:
-        model = Identification.of_run(band, load().run.methods[0])
+        model = identified(band, load().run.methods[0])
         episode = Episode.load_all(Layout().episodes(band))[0]
         card = export(model, target, folder, episode=episode).card
     if "met" not in card:

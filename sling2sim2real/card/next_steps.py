@@ -81,7 +81,7 @@ def _gains(
 ) -> Iterator[Gain]:
     single, more = (model.after(model.launched(aim, TAPE, count))[aim] for count in (1, LAUNCHES))
     yield Gain(
-        "Measure {a} launch and tell it with `sling observe --band {band}`: {before} {at} become"
+        "Measure {a} launch and tell it with `sling observe`: {before} {at} become"
         f" {{after}}, with {LAUNCHES} launches ±{_cm(more)} cm.",
         single,
     )

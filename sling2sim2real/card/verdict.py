@@ -43,8 +43,8 @@ CARRIED = 1.5
 RUBBER = 900, 1300  # kg/m^3 of solid natural, silicone and latex rubber
 # What is wrong where several of force, hand and recoil are missed.
 SIZES = (
-    "Weigh and measure the band again: mass, diameter and rest length under `bands` in params.yaml"
-    " are the first suspects where force, hand and recoil are missed together."
+    "Weigh and measure the band again: mass, diameter and rest length are the first suspects where"
+    " force, hand and recoil are missed together."
 )
 # A band that softens when it is drawn returns less than its pull shows.
 UNSEEN = (
@@ -210,7 +210,7 @@ def _identified(findings: Findings):
         yield Reason(
             False,
             "This method does not tell how sure its values are.",
-            "Put `least_squares` first under `run.methods` in params.yaml: it tells.",
+            "Take the method `least_squares`: it tells.",
         )
     elif not findings.settled:
         yield Reason(
@@ -227,7 +227,7 @@ def _identified(findings: Findings):
         )
     misfits = (
         ("force of the pull", findings.force, FORCE, "N", 1, "Check the force sensor and its frame,"
-         " and the band's mass, diameter and rest length under `bands` in params.yaml."),
+         " and the band's mass, diameter and rest length."),
         ("band in the hand", findings.held, HELD, "mm", 1000, "Check the camera's calibration"
          " and where it stands (`/tf_static`, or `setup.camera_to_fork`)."),
         ("recoil", findings.recoil, RECOIL, "mm", 1000, "Check the camera's clock with `sling"
@@ -268,8 +268,8 @@ def _identified(findings: Findings):
         yield Reason(
             False,
             f"The value of {label} is at the {side}; the true one may lie beyond.",
-            f"Check mass, diameter and rest length of the band, else widen the box of {label} in"
-            " params.yaml.",
+            f"Check mass, diameter and rest length of the band, else widen the box of {label}"
+            " (`settings`).",
         )
 
 
@@ -296,7 +296,7 @@ def _launches(findings: Findings):
     if findings.miss > MISS:
         yield Reason(
             True,
-            f"The policy misses a target by {100 * findings.miss:.0f} cm in its own simulator.",
+            f"The draw misses a target by {100 * findings.miss:.0f} cm in the simulator.",
             "Widen the box of draws (`setup.draw_y`, `setup.draw_z`), or aim at other targets.",
         )
     elif not findings.converged:

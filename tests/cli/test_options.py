@@ -13,11 +13,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from sling2sim2real.cli.preflight.add_band import _with_band
 
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli import checkout, cli
 from sling2sim2real.cli.command_line import COMMANDS
-from sling2sim2real.cli.preflight.add_band import _with_band
 from sling2sim2real.cli.preflight.check import Look
 from tests.cli.fit.test_fit import CARD, LAUNCHES
 from tests.cli.test_cli import aimable

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from sling2sim2real.cli.preflight.recordings import add_recording
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.fit import fit
 from sling2sim2real.cli.preflight.command import check
-from sling2sim2real.cli.preflight.recordings import add_recording
 from tests.cli.preflight.test_add_band import add
 from tests.project import contents, with_
 from tests.recording.parts import joined

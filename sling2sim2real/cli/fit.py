@@ -78,6 +78,7 @@ def fit(
         UserError: Something given is wrong, and nothing is changed; or a step fails, and what was
             done stays done.
     """
+    recordings = bag.once(recordings)
     file = _file(folder, recordings, sizes or {})
     settings = folder.settings_with(file)
     policy = policy or BandPolicy(folder.path).network.is_file()
@@ -158,7 +159,7 @@ def _bring_in(
     is_new = not folder.path.exists()
     there = {bag.sha256(recording): recording for recording in folder.recordings}
     new: dict[str, Path] = {}
-    for recording in bag.once(recordings):
+    for recording in recordings:
         digest = bag.sha256(recording)
         if digest in there:
             _copy_masks(recording, there[digest])

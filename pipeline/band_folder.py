@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sling2sim2real.api.band_folder import BandFile, BandFolder, differences
+from sling2sim2real.api.band_folder import SIZES, BandFile, BandFolder, differences
 from sling2sim2real.api.identification import Identification, fork_of
 from sling2sim2real.api.model import Band, Theta
 from sling2sim2real.api.settings import Settings
@@ -60,29 +60,34 @@ def identified(band: str, method: str, root: str | Path = ".") -> Identification
     )
 
 
-def write(band: str, method: str, root: str | Path = ".") -> dict:
-    """Write a band's folder; return what its card.json says. Raises UserError."""
+def card_inputs(band: str, method: str, root: str | Path = ".") -> CardInputs:
+    """What a band's card is made from. Raises UserError where an input is missing."""
     layout, found = Layout(Path(root)), identified(band, method, root)
-    settings, sizes = found.settings, vars(found.band)
-    episodes = Episode.load_all(layout.episodes(band))
     stored = Stored(band, method, layout.root)
-    targets = np.array(settings.trials.targets, float)
-    inputs = CardInputs(
+    targets = np.array(found.settings.trials.targets, float)
+    return CardInputs(
         found=found,
         method=method,
-        episodes=episodes,
+        episodes=Episode.load_all(layout.episodes(band)),
         launched=_landed(pd.read_parquet(made(layout.trials(band, method)))),
         aims=aims_of(found, targets, stored.draws(targets)),
         trained=stored.card()["training"]["converged"],
-        virtual=settings.bands[band].source == "rig",
+        virtual=found.settings.bands[band].source == "rig",
     )
-    recording = layout.raw(band) / episodes[0].metadata["input"]["file"]
-    pictures = Pictures.of(recording, episodes[0], settings.setup)
+
+
+def write(band: str, method: str, root: str | Path = ".") -> dict:
+    """Write a band's folder; return what its card.json says. Raises UserError."""
+    layout, inputs = Layout(Path(root)), card_inputs(band, method, root)
+    found, episode = inputs.found, inputs.episode
+    stored = Stored(band, method, layout.root)
+    recording = layout.raw(band) / episode.metadata["input"]["file"]
+    pictures = Pictures.of(recording, episode, found.settings.setup)
     with replacing_folder(layout.card(band)) as temporary:
         folder, policy = BandFolder(temporary), BandPolicy(temporary)
-        file = {name: sizes[name] for name in ("mass", "diameter", "rest_length")}
-        other = differences(settings, Settings.default())
-        BandFile(file, found.band.preconditioned, (), other).save(folder.band_file)
+        sizes = {name: getattr(found.band, name) for name in SIZES}
+        other = differences(found.settings, Settings.default())
+        BandFile(sizes, found.band.preconditioned, (), other).save(folder.band_file)
         found.save(folder.theta)
         shutil.copyfile(stored.network, policy.network)
         shutil.copyfile(stored.card_file, policy.card_file)

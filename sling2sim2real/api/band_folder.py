@@ -5,7 +5,7 @@
       orange/
         band.yaml       mass, diameter, rest_length; under `settings` what differs for this band
         recordings/     ROS 2 bags
-        launches.csv    measured launches (launching/launches_file.py)
+        launches.csv    measured launches (base/launches_file.py)
         episodes/       made of the recordings, each under a digest of all that made it
         start.json      where the fit begins: by the first recording alone
         theta.json      what was identified, and the digest of all that it rests on
@@ -32,9 +32,9 @@ from sling2sim2real.api.settings import Settings
 from sling2sim2real.base.errors import UserError, one_line
 from sling2sim2real.base.files import replacing
 from sling2sim2real.base.fingerprint import fingerprint
+from sling2sim2real.base.launches_file import LaunchRow, read_launches
 from sling2sim2real.base.layout import NotMade
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.launching.launches_file import LaunchRow, read_launches
 from sling2sim2real.recording.input.bag import sha256
 from sling2sim2real.recording.masks.folder import masks_beside
 

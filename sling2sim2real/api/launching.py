@@ -195,7 +195,7 @@ def _of_target(model: Model, launched: Launch, target: float) -> Iterator[Hazard
     if policy is not None and not low <= target <= high:
         what = f"the policy was trained for targets from {low:g} to {high:g} m, not {target:g} m"
         yield Hazard("target", what)
-    if policy is not None and policy.card()["theta"] != model.theta.content("")["theta"]:
+    if policy is not None and policy.card().get("theta") != model.theta.content("")["theta"]:
         what = "the policy was trained with another θ than there is now: train it anew"
         yield Hazard("stale", what)
     off = launched.landing - target

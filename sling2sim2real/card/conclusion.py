@@ -38,7 +38,6 @@ class Conclusion:
             landings = spread.chosen, spread.centres, spread.slope, aims.half_width
             model = LandingModel.of(samples.names, samples.values, *landings)
         steps = next_steps(
-            inputs.band,
             against,
             model,
             aims.target,

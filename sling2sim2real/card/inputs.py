@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from sling2sim2real.api.identification import Identification
+from sling2sim2real.base.launches_file import CHECK, LaunchRow
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.launching.launches_file import CHECK, LaunchRow
 from sling2sim2real.launching.trials.spread import Spread, landing_spread
 from sling2sim2real.launching.trials.stretch import recorded_stretch, stretch_of
 from sling2sim2real.settings import Params

@@ -11,8 +11,8 @@ import json
 import math
 from collections.abc import Callable
 
+from sling2sim2real.base.launches_file import LIMITS
 from sling2sim2real.base.schema import Range
-from sling2sim2real.launching.launches_file import LIMITS
 from sling2sim2real.settings.lab import BandParams, Topics
 
 METRES = {"centimetres": 1e-2, "millimetres": 1e-3}

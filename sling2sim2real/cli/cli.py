@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 from sling2sim2real.api.arguments import USUAL
 from sling2sim2real.base.errors import run
+from sling2sim2real.base.launches_file import CHECK, FIT
 from sling2sim2real.cli import arguments as kinds
 from sling2sim2real.cli import checkout
 from sling2sim2real.cli.command_line import JSON, REFUSED, Done, command, execute, flag, parser
 from sling2sim2real.exporting import ENGINES
-from sling2sim2real.launching.launches_file import CHECK, FIT
 
 if TYPE_CHECKING:
     from sling2sim2real.api.identification import Identification
@@ -259,8 +259,8 @@ def aim(arguments: argparse.Namespace) -> Done:
 )
 def observe(arguments: argparse.Namespace) -> Done:
     from sling2sim2real.api.band_folder import BandFolder
+    from sling2sim2real.base.launches_file import LaunchRow
     from sling2sim2real.cli.observe import observe, shown
-    from sling2sim2real.launching.launches_file import LaunchRow
 
     use = CHECK if arguments.check else FIT
     row = LaunchRow(arguments.draw, arguments.error, arguments.landing, use)

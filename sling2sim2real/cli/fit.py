@@ -31,13 +31,13 @@ from sling2sim2real.base.disk import expect_writable
 from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.base.files import replacing, replacing_folder, write_json
 from sling2sim2real.base.fingerprint import fingerprint
+from sling2sim2real.base.launches_file import FIT
 from sling2sim2real.base.layout import NotMade
 from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.cli.steps import Steps
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.posterior.launches import Observed
 from sling2sim2real.identification.results.mounting import Mounting
-from sling2sim2real.launching.launches_file import FIT
 from sling2sim2real.launching.surface.stored import BandPolicy
 from sling2sim2real.recording.input import bag
 from sling2sim2real.recording.masks.folder import MASK_NAME, masks_beside

@@ -11,9 +11,9 @@ from sling2sim2real.api.band_folder import BandFolder
 from sling2sim2real.api.identification import METHOD, Identification
 from sling2sim2real.api.launching import Hazard, launch
 from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.launches_file import FIT, LaunchRow, write_launches
 from sling2sim2real.cli.aim import tell
 from sling2sim2real.cli.fit import fit
-from sling2sim2real.launching.launches_file import FIT, LaunchRow, write_launches
 from sling2sim2real.simulator.rubber import RUBBER
 
 # Of a stretch. Up to this much further, the law rubber (simulator/rubber.py) moves the force at the

@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pipeline.band_folder import card_inputs
 from sling2sim2real.base.layout import Layout
-from sling2sim2real.card.inputs import CardInputs, card_inputs
+from sling2sim2real.card.inputs import CardInputs
 from sling2sim2real.recording.build import build_episodes
 from sling2sim2real.settings import Params, load
 from sling2sim2real.simulator.parameters import EXTRA
@@ -126,5 +127,5 @@ def card_params(project: Path) -> Params:
 
 
 @pytest.fixture(scope="session")
-def summary(project: Path, card_params: Params) -> CardInputs:
-    return card_inputs(card_params, BAND, METHOD, project)
+def summary(project: Path) -> CardInputs:
+    return card_inputs(BAND, METHOD, project)

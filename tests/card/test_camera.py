@@ -17,7 +17,7 @@ from sling2sim2real.recording.geometry import EpisodeGeometry, geometry_of
 from sling2sim2real.recording.input.camera import Camera
 from sling2sim2real.recording.input.frames import Transform
 from sling2sim2real.recording.input.reader import read_recording
-from tests.card.conftest import BAND, METHOD, TRUTH
+from tests.card.conftest import BAND, TRUTH
 from tests.recording.parts import split
 
 
@@ -84,13 +84,27 @@ def test_the_parts_of_a_split_bag_are_one_recording(pictures, summary, project, 
         np.testing.assert_array_equal(parts[number], pictures[number])
 
 
+def test_what_a_card_shows_is_kept_as_it_is(pictures, summary, tmp_path) -> None:
+    """And what is looked up by time is found alike."""
+    few = pictures.around(summary.episode)
+    few.save(tmp_path / "pictures")
+    again = Pictures.load(tmp_path / "pictures", summary.episode)
+    assert len(again.time) < len(pictures.time)
+    moments = np.append(TRUTH.release + np.arange(-0.25, 0.35, 0.01), TRUTH.grasp - 0.1)
+    for moment in moments:
+        before, after = (seen.latest(moment) for seen in (pictures, again))
+        assert pictures.time[before] == again.time[after]
+        np.testing.assert_array_equal(pictures[before], again[after])
+    assert again.camera.width == pictures.camera.width
+
+
 def test_a_missing_recording_is_named(summary, tmp_path) -> None:
     with pytest.raises(NotMade, match="none.mcap"):
         Pictures.of(tmp_path / "none.mcap", summary.episode, summary.params.setup)
 
 
-def test_a_simulated_pull_holds_the_hand_and_its_states_are_smooth(summary, card_params) -> None:
-    simulated = simulate(card_params, BAND, METHOD, summary.episode, summary.theta)
+def test_a_simulated_pull_holds_the_hand_and_its_states_are_smooth(summary) -> None:
+    simulated = simulate(summary.found, summary.episode)
     assert simulated.release == TRUTH.release
     middle = simulated.line(TRUTH.release - 0.05)[60]
     np.testing.assert_allclose(middle, TRUTH.hand(TRUTH.release - 0.05), atol=5e-3)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from sling2sim2real.api.identification import Identification
+from pipeline.band_folder import identified
 from sling2sim2real.base.files import write_json
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.identification.results.theta import calibrated, load_theta
@@ -46,5 +46,5 @@ def test_what_a_method_leaves_out_is_left_out_everywhere(
     saved = load_theta(path, "band1")
     assert json.loads(path.read_text()).get("mounted") == (None if mounting else False)
     assert (calibrated(params, "band1", saved).flexural_rigidity == 2e-3) == mounting
-    summary = Identification.of_run("band1", "sling2sim2real")
+    summary = identified("band1", "sling2sim2real")
     assert (summary.mounting is not None) == mounting

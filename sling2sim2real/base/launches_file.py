@@ -103,7 +103,7 @@ def _row(where: str, cells: dict[str, str]) -> LaunchRow:
     use = cells["use"] or FIT
     if use not in USES:
         raise UserError(f"{where}: use must be {' or '.join(USES)}, got {use!r}")
-    y, z, error, landing = (_metres(where, name, cells[name]) for name in COLUMNS[:4])
+    y, z, error, landing = (metres(where, name, cells[name]) for name in COLUMNS[:4])
     if y is None or z is None:
         raise UserError(f"{where}: a launch needs draw_y and draw_z")
     if landing is None and use == FIT:
@@ -111,7 +111,8 @@ def _row(where: str, cells: dict[str, str]) -> LaunchRow:
     return LaunchRow((y, z), error, landing, use)
 
 
-def _metres(where: str, name: str, text: str) -> float | None:
+def metres(where: str, name: str, text: str) -> float | None:
+    """A cell of a column of lengths; None where it is empty. Raises UserError: `where` and why."""
     if not text:
         return None
     try:

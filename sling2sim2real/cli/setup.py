@@ -67,7 +67,7 @@ class LabMeasures:
 
     @property
     def nothing(self) -> bool:
-        return not any(vars(self).values())
+        return all(value is None for value in vars(self).values())
 
 
 def set_up(measured: LabMeasures, path: Path = BANDS / "lab.yaml") -> dict:

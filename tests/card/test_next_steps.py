@@ -66,7 +66,7 @@ def test_a_dip_is_recommended_where_no_pull_unloads() -> None:
 def test_what_speaks_against_any_use_is_mended_first() -> None:
     model = landing_model()
     reasons = [Reason(True, "why", "Do this."), Reason(False, "too", "And that.")]
-    requested = "toy", reasons, model, np.array([1.7, 1.9]), [still(0.0)]
+    requested = reasons, model, np.array([1.7, 1.9]), [still(0.0)]
     assert next_steps(*requested) == ["Do this.", "And that."]
 
 

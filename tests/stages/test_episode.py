@@ -74,5 +74,5 @@ def test_a_band_without_a_recording_says_who_makes_one(folder, params, monkeypat
         episode.main()
     changed = with_(params, "bands.band1", source="recording")
     monkeypatch.setattr(episode, "started", lambda *_: (changed, "band1"))
-    with pytest.raises(UserError, match="sling add-recording --band band1 FILE.mcap` puts one"):
+    with pytest.raises(UserError, match="no recording is in it; put the band's FILE.mcap there"):
         episode.main()

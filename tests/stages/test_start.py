@@ -123,7 +123,7 @@ def test_a_file_that_is_missing_or_damaged_says_what_makes_it(stage) -> None:
         anew = f"`dvc repro --force {makes}` makes it anew"
         assert remedy(NotMade(Path(path), "damaged")) == anew
     message = remedy(NotMade(Path("data/raw/mine/one.mcap")))
-    assert message == "`sling add-recording --band mine FILE.mcap` puts a recording there"
+    assert message == "put the band's FILE.mcap there"
     path = Path("data/policies/band1/de/card.json")
     assert remedy(NotMade(Path("data/theta/band2/adam.json"))).startswith("name adam under run.")
     for path in ("mine.json", "data/trials/measured/band1.csv", "data/plans/band1/a.csv", "data"):

@@ -35,7 +35,7 @@ def check_band(
         raise UserError(f"{folder.path}: name one recording, of {names}")
     band = GivenBand(folder.settings.bands[folder.name], str(folder.band_file))
     done = [
-        _checked(file, folder.settings, band, as_json=as_json, **options) for file in recordings
+        checked(file, folder.settings, band, as_json=as_json, **options) for file in recordings
     ]
     texts = [text for text, _ in done]
     if as_json and len(texts) > 1:
@@ -49,15 +49,15 @@ def check(recording: Path, sizes: dict[str, float], **options) -> tuple[str, int
     Args:
         recording: An MCAP file, or a bag's folder.
         sizes: What is known of its band [kg, m].
-        options: As `_checked` has them.
+        options: As `checked` has them.
     """
     settings = lab_settings()
     if not (BANDS / "lab.yaml").is_file():
         say(f"no {BANDS / 'lab.yaml'} here: the usual settings hold")
-    return _checked(recording, settings, GivenBand.of(sizes, settings.setup), **options)
+    return checked(recording, settings, GivenBand.of(sizes, settings.setup), **options)
 
 
-def _checked(
+def checked(
     recording: Path,
     params: Params,
     band: GivenBand,

@@ -225,7 +225,7 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
         "--force",
         "--no-run-cache",
         "--downstream",
-        "history@band1-sling2sim2real",  # of one phase: tests/identification/searches/test_search.py
+        "history@band1-sling2sim2real",  # of one phase: tests/identification
     )
     assert ran == {*of_method(PAPER), "report"}
     assert (project.folder / "dvc.lock").read_text() == before

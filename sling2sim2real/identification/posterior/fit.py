@@ -103,6 +103,7 @@ def fit(
             return _density(coordinates, phi, nuisances, expansions, launched, steps)
 
         phi, nuisances = np.array(start, float), np.zeros((len(recordings), 3))
+        best, near = None, False
         for _ in range(PASSES):
             try:
                 begun = expanded(phi, nuisances, None)
@@ -117,6 +118,7 @@ def fit(
             phi, nuisances = best.phi, best.nuisances
             if near or not best.settled:
                 break
+    assert best is not None
     return replace(best, settled=best.settled and near, steps=steps)
 
 

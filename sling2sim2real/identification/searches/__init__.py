@@ -1,1 +1,1 @@
-"""Optimisers behind ask and tell, a folder each."""
+"""Searches of the unit cube, a file each: functions over `evaluate` (identification/search.py)."""

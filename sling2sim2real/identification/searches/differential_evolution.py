@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,10 +33,11 @@ def differential_evolution(
     """
     from scipy import optimize
 
+    first: Any = latin_hypercube(dimension, population, seed)  # SciPy's stubs know names alone
     optimize.differential_evolution(
         lambda generation: evaluate(generation.T),
         [(0.0, 1.0)] * dimension,
-        init=latin_hypercube(dimension, population, seed),
+        init=first,
         rng=np.random.default_rng([seed, 1]),
         maxiter=-(-rollouts // population) - 1,
         mutation=mutation,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import re
 from collections.abc import Callable
 
 from sling2sim2real.base.launches_file import LIMITS
@@ -180,3 +181,10 @@ def topic(text: str) -> tuple[str, str]:
     if role not in ROLES or not name:
         raise argparse.ArgumentTypeError(f"must be ROLE=TOPIC, of {', '.join(ROLES)}, got {text!r}")
     return role, name
+
+
+def address(text: str) -> str:
+    """Check that an argument is the address of a Dask scheduler."""
+    if not re.fullmatch(r"(\w+://)?(\[.+\]|[^:/\s]+):\d{1,5}", text):
+        raise argparse.ArgumentTypeError(f"must be such as tcp://10.0.0.5:8786, got {text!r}")
+    return text

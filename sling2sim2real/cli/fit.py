@@ -18,12 +18,8 @@ import numpy as np
 
 from sling2sim2real.api.arguments import USUAL
 from sling2sim2real.api.band_folder import SIZES, BandFile, BandFolder
-from sling2sim2real.api.identification import (
-    METHOD,
-    Identification,
-    identify,
-    starting_model,
-)
+from sling2sim2real.api.identification import METHOD, Identification
+from sling2sim2real.api.identify import identify, starting_model
 from sling2sim2real.api.launching import draw_for
 from sling2sim2real.api.model import Model, Theta
 from sling2sim2real.api.settings import Settings

@@ -34,9 +34,7 @@ def check_band(
         names = ", ".join(map(str, recordings)) or "none"
         raise UserError(f"{folder.path}: name one recording, of {names}")
     band = GivenBand(folder.settings.bands[folder.name], str(folder.band_file))
-    done = [
-        checked(file, folder.settings, band, as_json=as_json, **options) for file in recordings
-    ]
+    done = [checked(file, folder.settings, band, as_json=as_json, **options) for file in recordings]
     texts = [text for text, _ in done]
     if as_json and len(texts) > 1:
         texts = [json.dumps({"recordings": [json.loads(text) for text in texts]}, indent=2)]

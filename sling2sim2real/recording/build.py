@@ -31,33 +31,47 @@ from sling2sim2real.settings import Params, expect_known
 from sling2sim2real.settings.lab import BandParams
 
 
-@dataclass
-class Processed:
-    """One pull as far as it can be used: what comes after a refusal is not there.
+@dataclass(frozen=True)
+class Whole:
+    """A pull that was processed to its end.
 
     Attributes:
-        part: What was recorded of it.
-        weighed: Whether the band's mass is known: without it nothing is judged by the weight.
         pull: With its events, its stamps corrected by `delays`.
         coverage: A row a picture.
         taut_coverage: As `clouds.taut_coverage` has it.
-        calibration: None also where too little of the drawn band is seen.
+        calibration: None where too little of the drawn band is seen.
+        start: Of the window, since the file's first force [s].
+    """
+
+    pull: Pull
+    delays: Delays
+    signals: Signals
+    scene: Scene
+    view: View
+    clouds: Clouds
+    coverage: list[PictureLine]
+    taut_coverage: tuple[float | None, float | None]
+    calibration: Calibration | None
+    start: float
+
+
+@dataclass
+class Processed:
+    """A pull as far as it can be used: what comes after a refusal is None.
+
+    Attributes:
+        part: What was recorded of it.
+        delays, signals, scene, view: Of its way.
+        whole: All of it.
         findings: Of all checks, in the order of the way.
     """
 
     part: Part
-    band: BandParams
-    params: Params
-    weighed: bool = True
-    pull: Pull | None = None
     delays: Delays | None = None
     signals: Signals | None = None
     scene: Scene | None = None
     view: View | None = None
-    clouds: Clouds | None = None
-    coverage: list[PictureLine] = field(default_factory=list)
-    taut_coverage: tuple[float | None, float | None] = (None, None)
-    calibration: Calibration | None = None
+    whole: Whole | None = None
     findings: list[Finding] = field(default_factory=list)
 
     @property
@@ -69,11 +83,6 @@ class Processed:
     def refusal(self) -> Finding | None:
         """Why the pull cannot be used."""
         return next((finding for finding in self.findings if finding.refused), None)
-
-    @property
-    def start(self) -> float:
-        """Start of the window, since the file's first force [s]; 0 where there is none."""
-        return (self.signals.origin - self.part.recording.origin) * 1e-9 if self.signals else 0.0
 
     def check(self, findings: Iterable[Finding]) -> None:
         """Keep what a check point finds. Raises UserError where it refuses the pull."""
@@ -92,7 +101,7 @@ def build_episodes(
     """
     expect_known(params, "band", band_name)
     usable, refused = process_recording(path, params.bands[band_name], params)
-    return [episode_of(done, band_name, params) for done in usable], refused
+    return [episode_of(done, band_name) for done in usable], refused
 
 
 def process_recording(
@@ -120,46 +129,46 @@ def process_recording(
 
 
 def process(part: Part, band: BandParams, params: Params, weighed: bool = True) -> Processed:
-    """One pull, step by step, up to the end or to what refuses it."""
-    done = Processed(part, band, params, weighed)
+    """One pull, step by step, up to the end or to what refuses it.
+
+    Args:
+        weighed: Whether the band's mass is known: without it nothing is judged by the weight.
+    """
+    done = Processed(part)
     try:
-        _process(done)
+        _process(done, band, params, weighed)
     except UserError as error:
         if not done.refusal:
             done.findings.append(Finding("pull", str(error), "", refused=True))
     return done
 
 
-def _process(done: Processed) -> None:
+def _process(done: Processed, band: BandParams, params: Params, weighed: bool) -> None:
     """Topics, events, delays, signals, pictures, with three check points. Raises UserError."""
-    band, params, geometry = done.band, done.params, done.part.geometry
-    done.check(checks.of_topics(done.part))
-    pull, done.delays = correct_delays(Pull.of(done.part), params)
-    signals = done.signals = signals_of(pull, params, done.delays.tool_inertia)
-    scene = done.scene = Scene.of(band, params.setup, signals)
-    done.pull = pull
-    done.check(checks.of_signals(pull, done.delays, signals, scene, band, params, done.weighed))
-    done.view = View(pull.recording, geometry, scene, signals.duration)
-    clouds = done.clouds = clouds_of(done.view, params.cloud)
-    done.coverage = over_time(scene, clouds, done.start)
-    done.taut_coverage = taut_coverage(scene, clouds)
-    done.check(checks.of_pictures(scene, clouds, done.coverage, done.taut_coverage[0]))
-    done.calibration = calibration_of(
-        scene,
-        clouds.time,
-        clouds.points,
-        geometry.camera.translation,
-        float(band.mass),
-        np.array(params.setup.clamp_direction),
-    )
-    done.check(checks.of_calibration(done.calibration, geometry))
+    part, setup = done.part, params.setup
+    done.check(checks.of_topics(part))
+    pull, delays = correct_delays(Pull.of(part), params)
+    signals = signals_of(pull, params, delays.tool_inertia)
+    scene = Scene.of(band, setup, signals)
+    done.delays, done.signals, done.scene = delays, signals, scene
+    done.check(checks.of_signals(pull, delays, signals, scene, band, params, weighed))
+    view = done.view = View(pull.recording, part.geometry, scene, signals.duration)
+    clouds = clouds_of(view, params.cloud)
+    start = (signals.origin - part.recording.origin) * 1e-9
+    seen = over_time(scene, clouds, start), taut_coverage(scene, clouds)
+    eye, clamp = part.geometry.camera.translation, np.array(setup.clamp_direction)
+    calibration = calibration_of(scene, clouds.time, clouds.points, eye, float(band.mass), clamp)
+    done.whole = Whole(pull, delays, signals, scene, view, clouds, *seen, calibration, start)
+    done.check(checks.of_pictures(scene, clouds, *seen))
+    done.check(checks.of_calibration(calibration, part.geometry))
 
 
-def episode_of(done: Processed, band_name: str, params: Params) -> Episode:
+def episode_of(done: Processed, band_name: str) -> Episode:
     """The episode of a pull that can be used, with all that was chosen in its metadata."""
-    pull, signals, clouds, delays = done.pull, done.signals, done.clouds, done.delays
-    if pull is None or signals is None or clouds is None or delays is None:
+    whole = done.whole
+    if whole is None or done.refusal:
         raise UserError(str(done.refusal))
+    pull, signals, clouds = whole.pull, whole.signals, whole.clouds
     recording, geometry = pull.recording, pull.geometry
 
     def of_streams(name: str) -> dict[str, Any]:
@@ -182,7 +191,7 @@ def episode_of(done: Processed, band_name: str, params: Params) -> Episode:
         },
         "cautions": [caution.content() for caution in done.cautions],
         "geometry": EpisodeGeometry.of(recording, geometry).content(),
-        "preprocessing": {**asdict(signals.facts), "delays": asdict(delays)},
+        "preprocessing": {**asdict(signals.facts), "delays": asdict(whole.delays)},
     }
     return Episode(
         band=band_name,

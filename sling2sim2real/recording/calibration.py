@@ -24,8 +24,8 @@ SPAN = 0.02  # s before and after a picture that tell its hand's speed
 CELL = 0.01  # m of the hand's path whose pictures count as one: they share their errors
 LEAST_FRAMES, LEAST_POINTS, MOST_POINTS = 5, 20, 150
 SEEN = 0.7  # radii by which the middle of what is seen lies before the line
-# What is fitted: shifts of the camera and of the hand [m]; beside them what widens the lines alike on
-# both sides (the fingers' width, an error of the fork's) [m], how far the band's middle lies behind
+# What is fitted: shifts of the camera and of the hand [m]; beside them what widens the lines alike
+# on both sides (the fingers' width, an error of the fork's) [m], how far the band's middle lies behind
 # its surface [m], and the root of the band's stiffness in bending [sqrt(N) m].
 MEAN = np.array([0, 0, 0, 0, 0, 0, 0.003, 0, 0, 0.015])
 PRIOR = np.array([0.03, 0.03, 0.03, 0.01, 0.01, 0.01, 0.003, 0.002, 0.0005, 0.01])
@@ -49,7 +49,7 @@ class Calibration:
         camera_error: Standard errors, shape (3,).
         hand: Where the band's end in the hand is, less where the pose puts it, shape (3,).
         hand_error: Standard errors, shape (3,).
-        residual: Median distance of points from the band's surface after the correction.
+        residual: Median distance of points from where they are expected, along the sight.
         frames: Pictures that were used.
     """
 
@@ -156,7 +156,8 @@ def calibration_of(
     )
     errors[:3] = np.hypot(errors[:3], np.hypot(FLOOR, LAW * state[9] * tip * np.abs(clamp)))
     errors[3:6] = np.hypot(errors[3:6], FLOOR)
-    residual = float(np.median(np.abs(left[0::2])))
+    pairs = 2 * sum(len(picture.points) for picture in pictures)
+    residual = float(np.median(np.abs(left[:pairs:2])))
     return Calibration(-state[:3], errors[:3], state[3:6], errors[3:6], residual, len(pictures))
 
 

@@ -339,15 +339,18 @@ def of_signals(
 
 
 def of_pictures(
-    scene: Scene, clouds: Clouds, rows: Sequence[PictureLine], drawn: float | None
+    scene: Scene,
+    clouds: Clouds,
+    rows: Sequence[PictureLine],
+    taut: tuple[float | None, float | None],
 ) -> Iterator[Finding]:
     """What the pictures show of the band.
 
     Args:
-        rows: Of `coverage_of`.
-        drawn: Share of the drawn band that is covered; None where it was never drawn.
+        rows: A row a picture.
+        taut: As `clouds.taut_coverage` has it.
     """
-    if drawn is None:
+    if taut[0] is None:
         what = f"no picture shows the band drawn taut at a rest length of {scene.rest_length:g} m"
         yield found("coverage", what, "check the rest length, or record a longer pull", True)
         return

@@ -268,7 +268,7 @@ def over_time(scene: Scene, clouds: Clouds, start: float) -> list[PictureLine]:
     ]
 
 
-def by_phase(rows: list[PictureLine]) -> list[PhaseLine]:
+def by_phase(rows: Sequence[PictureLine]) -> list[PhaseLine]:
     """The rows of `over_time` gathered, phases without a picture left out."""
     table = []
     for name in PHASES:

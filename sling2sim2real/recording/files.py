@@ -123,8 +123,9 @@ def _merged(channels: Iterable[Channel]) -> list[Channel]:
     by_kind: dict[tuple, Channel] = {}
     for channel in channels:
         schema = channel.schema
-        text = re.sub(rb"#[^\n]*|\s+", b" ", schema.data) if "msg" in schema.encoding else b""
-        text = re.sub(rb"\s+", b" ", text) or schema.data
+        text = schema.data
+        if "msg" in schema.encoding:
+            text = b" ".join(re.sub(rb"#[^\n]*", b"", text).split())
         kind = channel.topic, schema.name, schema.encoding, text, channel.encoding
         if kind in by_kind:
             by_kind[kind].log_times.extend(channel.log_times)
@@ -498,12 +499,18 @@ def _follow(parts: list[Path]) -> bool:
 
 @lru_cache(maxsize=64)
 def _span(part: Path, _written: int) -> tuple[int, int] | None:
-    """Log times of the first and of the last message [ns], as its end says; None: no such MCAP."""
+    """Log times of the first and of the last message [ns], as its end or its chunks say."""
+    times: list[int] = []
     with suppress(*DAMAGE, UserError, OSError), opened(part) as file:
-        summary = make_reader(file).get_summary()
-        if summary and (numbers := summary.statistics):
-            return numbers.message_start_time, numbers.message_end_time
-    return None
+        with suppress(*DAMAGE):
+            summary = make_reader(file).get_summary()
+            if summary and (numbers := summary.statistics):
+                return numbers.message_start_time, numbers.message_end_time
+        file.seek(0)  # it has no end
+        for record in StreamReader(file, emit_chunks=True, record_size_limit=LIMIT).records:
+            if isinstance(record, kinds.Chunk) and record.message_end_time:
+                times += (record.message_start_time, record.message_end_time)
+    return (min(times), max(times)) if times else None
 
 
 @contextmanager

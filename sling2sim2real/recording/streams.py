@@ -177,8 +177,8 @@ class Recording:
     wrench: Stream[np.ndarray]
     pose: Stream[np.ndarray]
     gripper: Stream[np.ndarray] | None
-    color: Stream[Pictures]
-    depth: Stream[Pictures]
+    color: Stream[Sequence[Picture]]
+    depth: Stream[Sequence[Picture]]
     color_camera: Camera
     depth_camera: Camera
     transforms: TransformTree

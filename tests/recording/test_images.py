@@ -13,7 +13,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from PIL import Image
 
-from sling2sim2real.recording.input.images import (
+from sling2sim2real.recording.images import (
     Undecodable,
     Unsupported,
     color,
@@ -21,7 +21,7 @@ from sling2sim2real.recording.input.images import (
     is_depth,
     size_of,
 )
-from sling2sim2real.recording.input.readings import Picture
+from sling2sim2real.recording.messages import Picture
 
 RANDOM = np.random.default_rng(0)
 BGR = RANDOM.integers(0, 256, (6, 5, 3)).astype(np.uint8)

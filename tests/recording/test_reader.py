@@ -12,9 +12,9 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.geometry import geometry_of
-from sling2sim2real.recording.input.container import read_container
-from sling2sim2real.recording.input.reader import read_recording, recording_of
+from sling2sim2real.recording.files import read_container
+from sling2sim2real.recording.frames import geometry_of
+from sling2sim2real.recording.streams import read_recording, recording_of
 from validation.recordings.bag import START, blind_bag, edit, head
 
 

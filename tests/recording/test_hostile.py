@@ -6,8 +6,8 @@ import pytest
 from mcap.writer import Writer
 
 from sling2sim2real.base.errors import UserError, printable
-from sling2sim2real.recording.input.reader import read_recording
-from sling2sim2real.recording.input.words import shortened
+from sling2sim2real.recording.streams import read_recording
+from sling2sim2real.recording.words import shortened
 from sling2sim2real.settings import load
 from tests.project import DEFAULTS
 from validation.recordings.bag import blind_bag

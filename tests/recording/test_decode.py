@@ -15,9 +15,7 @@ from mcap_ros2._dynamic import serialize_dynamic
 from rosbags.typesys import Stores, get_typestore
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.input.contents import Channel
-from sling2sim2real.recording.input.decode import Unreadable, decoder
-from sling2sim2real.recording.input.readings import read_wrench
+from sling2sim2real.recording.messages import Channel, Unreadable, decoder, read_wrench
 
 NAME = "geometry_msgs/msg/WrenchStamped"
 MSG = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(NAME, ros_version=2)[0]

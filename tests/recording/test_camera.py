@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.input.camera import Camera, camera_from, read_calibration
+from sling2sim2real.recording.camera import Camera, camera_from
+from sling2sim2real.recording.messages import read_calibration
 
 K = np.array([[60.0, 0, 31.5], [0, 62.0, 23.5], [0, 0, 1]])
 PLUMB_BOB = [0.1, -0.05, 0.001, -0.002, 0.01]

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sling2sim2real.recording.input.frames import Transform, TransformTree
+from sling2sim2real.recording.transforms import Transform, TransformTree
 
 number = st.floats(-5, 5)
 vectors = st.tuples(number, number, number)

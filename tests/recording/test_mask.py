@@ -9,11 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.cloud import clouds_of
-from sling2sim2real.recording.input.frames import Transform
-from sling2sim2real.recording.masks.hand import Colors, Shape
-from sling2sim2real.recording.masks.ridge import RidgeMask
-from sling2sim2real.recording.view import View
+from sling2sim2real.recording.clouds import clouds_of
+from sling2sim2real.recording.mask import Colors, RidgeMask, Shape
+from sling2sim2real.recording.scene import View
+from sling2sim2real.recording.transforms import Transform
 from sling2sim2real.settings import load
 from tests.project import DEFAULTS
 from validation.recordings import looks, strand

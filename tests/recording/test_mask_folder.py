@@ -14,17 +14,16 @@ from PIL import Image
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording.build import (
-    Checked,
+    Processed,
     build_episodes,
     episode_of,
     process,
-    process_pull,
 )
-from sling2sim2real.recording.input.reader import read_recording
-from sling2sim2real.recording.masks import masker
-from sling2sim2real.recording.pulls import Pull
-from sling2sim2real.recording.view import View
+from sling2sim2real.recording.clouds import masker
+from sling2sim2real.recording.scene import View
+from sling2sim2real.recording.streams import read_recording
 from tests.project import with_
+from tests.recording.conftest import part_of, processed_of, whole_of
 from tests.recording.parts import joined
 from validation.recordings import looks
 from validation.recordings.looks import LOOKS
@@ -36,12 +35,12 @@ def by_folder(params):
 
 
 @pytest.fixture(scope="module")
-def folded(masked, by_folder) -> Checked:
+def folded(masked, by_folder) -> Processed:
     """`seen` by its masks; to be read only."""
-    return process(masked, by_folder.bands["band1"], by_folder)
+    return processed_of(masked, by_folder)
 
 
-def view_beside(folded: Checked, mine: Path) -> View:
+def view_beside(folded: Processed, mine: Path) -> View:
     """Its view, whose masks are beside another recording."""
     view = copy(folded.view)
     view.recording = replace(view.recording, path=mine)
@@ -60,7 +59,7 @@ def files(recording: Path) -> list[Path]:
 
 
 def test_the_same_masks_give_the_same_episode_to_the_byte(episode, folded, by_folder) -> None:
-    ours, theirs = episode, episode_of(folded, "band1", by_folder)
+    ours, theirs = episode, episode_of(folded, "band1")
     for name in ("time", "position", "velocity", "force", "opening", "cloud_time", "camera"):
         assert getattr(ours, name).tobytes() == getattr(theirs, name).tobytes()
     assert [cloud.tobytes() for cloud in ours.clouds] == [
@@ -76,7 +75,7 @@ def test_each_mask_counts_for_its_own_picture_and_no_other(mine, checked, by_fol
     assert whole.any()
     Image.fromarray(np.zeros_like(whole)).save(black)
     Image.fromarray(np.asarray(Image.open(files(mine)[21])) > 0).save(files(mine)[21])
-    theirs = process(mine, by_folder.bands["band1"], by_folder)
+    theirs = whole_of(mine, by_folder)
     expected = checked.clouds.pixels.copy()
     expected[20] = 0
     assert theirs.clouds.pixels.tolist() == expected.tolist()
@@ -84,9 +83,9 @@ def test_each_mask_counts_for_its_own_picture_and_no_other(mine, checked, by_fol
 
 def test_a_late_camera_does_not_change_the_names(masked, params, by_folder) -> None:
     recording = read_recording(masked, params.setup).shifted(camera=-0.015)
-    done = process_pull(Pull.of(recording, params.setup), params.bands["band1"], by_folder)
+    done = process(part_of(recording, params), params.bands["band1"], by_folder)
     assert done.delays.camera.applied
-    assert done.clouds.pixels.min() > 0
+    assert done.whole.clouds.pixels.min() > 0
 
 
 def test_what_a_mask_marks_where_the_band_cannot_be_is_not_the_band(mine, folded) -> None:

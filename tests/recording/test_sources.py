@@ -11,10 +11,9 @@ from mcap_ros2._dynamic import serialize_dynamic
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.input import kinematics
-from sling2sim2real.recording.input.contents import Channel
-from sling2sim2real.recording.input.decode import Unreadable
-from tests.recording.input.messages import (
+from sling2sim2real.recording import kinematics
+from sling2sim2real.recording.messages import Channel, Unreadable
+from tests.recording.messages import (
     COUNT,
     FORCE,
     PLACES,

@@ -9,9 +9,9 @@ import numpy as np
 from mcap.records import Schema
 from scipy.spatial.transform import Rotation
 
-from sling2sim2real.recording.input.container import Container
-from sling2sim2real.recording.input.contents import Channel
-from sling2sim2real.recording.input.topics import choose
+from sling2sim2real.recording.files import Container
+from sling2sim2real.recording.messages import Channel
+from sling2sim2real.recording.topics import choose
 
 COUNT, RATE = 200, 100.0
 TIMES = np.arange(COUNT) / RATE

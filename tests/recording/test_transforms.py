@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sling2sim2real.recording.input.container import Container
-from sling2sim2real.recording.input.transforms import transforms_of
-from tests.recording.input.messages import channel
+from sling2sim2real.recording.files import Container
+from sling2sim2real.recording.topics import transforms_of
+from tests.recording.messages import channel
 
 
 def edge(parent: str, child: str, x: float, k: int) -> dict:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pytest
@@ -11,10 +10,15 @@ from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.input.bag import missing_parts, name_of, once, parts_of, sha256
-from sling2sim2real.recording.input.container import read_container
-from sling2sim2real.recording.input.contents import OVERHEAD
-from sling2sim2real.recording.input.reader import read_recording
+from sling2sim2real.recording.files import (
+    missing_parts,
+    name_of,
+    once,
+    parts_of,
+    read_container,
+    sha256,
+)
+from sling2sim2real.recording.streams import read_recording
 from tests.recording.parts import metadata, split
 from tests.recording.test_foxglove import assert_same_recording
 from validation.recordings.bag import blind_bag, messages_of, write_bag
@@ -103,12 +107,12 @@ def test_a_part_without_its_end_is_named(parts) -> None:
 @pytest.mark.parametrize(
     ("files", "listed", "words"),
     [
-        ({}, None, "is a folder without an MCAP file"),
-        ({"my_0.db3": b"x"}, ["my_0.db3"], "lists my_0.db3, of which no .mcap file is there"),
+        ({}, None, "is a folder without a recording"),
+        ({}, ["my_0.db3"], "lists my_0.db3, of which none is there"),
         ({"a.mcap": b"x", "b.mcap": b"x"}, None, "holds several recordings, name one of them: a.m"),
         ({"my_0.mcap": b"x" * 20}, ["my_0.mcap"], "my_0.mcap: not an MCAP file"),
         ({"my_0.mcap": b"x"}, ["../my_0.mcap"], "my_0.mcap: not an MCAP file"),
-        ({"my_0.mcap": b""}, None, "is a folder without an MCAP file"),
+        ({"my_0.mcap": b""}, None, "is a folder without a recording"),
     ],
 )
 def test_what_is_no_bag_is_one_line(tmp_path, files, listed, words) -> None:
@@ -127,15 +131,3 @@ def test_metadata_that_is_none_is_one_line(parts, text) -> None:
     for given in (parts[0].parent, parts[0]):
         with pytest.raises(UserError, match="metadata.yaml: is no metadata of a ROS 2 bag"):
             parts_of(given)
-
-
-def test_a_bag_whose_parts_hold_too_much_is_refused(parts, monkeypatch, tmp_path) -> None:
-    """The limit is the recording's, not the part's."""
-    read = read_container(parts[0])
-    total = sum(
-        OVERHEAD + len(payload) for channel in read.channels for payload in channel.payloads
-    )
-    monkeypatch.setattr("sling2sim2real.recording.input.contents.MOST", total - 1)
-    with pytest.raises(UserError, match="holds more than"):
-        read_container(parts[0])
-    read_container(shutil.copy(parts[1], tmp_path / "alone.mcap"))

@@ -9,9 +9,9 @@ import pytest
 from mcap.records import Schema
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.input.contents import Channel
-from sling2sim2real.recording.input.topics import camera_of
-from tests.recording.input.messages import (
+from sling2sim2real.recording.messages import Channel
+from sling2sim2real.recording.topics import camera_of
+from tests.recording.messages import (
     CAMERA,
     PLACES,
     TIMES,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sling2sim2real.recording.input import pace
+from sling2sim2real.recording import pace
 
 MS = 1_000_000
 

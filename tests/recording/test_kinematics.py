@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.input import kinematics
-from sling2sim2real.recording.input.kinematics import chain_of
+from sling2sim2real.recording import kinematics
+from sling2sim2real.recording.kinematics import chain_of
 
 MIXED = """<robot name="mixed">
   <link name="world"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/>

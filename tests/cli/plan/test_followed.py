@@ -150,6 +150,7 @@ def test_of_several_pulls_the_first_that_can_be_used_tells(recorded, monkeypatch
     """A first pull that says nothing is passed over, as `check` does."""
     from sling2sim2real.recording import events
     from sling2sim2real.recording.frames import geometry_of
+    from sling2sim2real.recording.streams import read_recording
 
     path, _, params, truth = recorded
     recording = read_recording(path, params.setup)

@@ -25,8 +25,8 @@ CELL = 0.01  # m of the hand's path whose pictures count as one: they share thei
 LEAST_FRAMES, LEAST_POINTS, MOST_POINTS = 5, 20, 150
 SEEN = 0.7  # radii by which the middle of what is seen lies before the line
 # What is fitted: shifts of the camera and of the hand [m]; beside them what widens the lines alike
-# on both sides (the fingers' width, an error of the fork's) [m], how far the band's middle lies behind
-# its surface [m], and the root of the band's stiffness in bending [sqrt(N) m].
+# on both sides (the fingers' width, an error of the fork's) [m], how far the band's middle lies
+# behind its surface [m], and the root of the band's stiffness in bending [sqrt(N) m].
 MEAN = np.array([0, 0, 0, 0, 0, 0, 0.003, 0, 0, 0.015])
 PRIOR = np.array([0.03, 0.03, 0.03, 0.01, 0.01, 0.01, 0.003, 0.002, 0.0005, 0.01])
 HUNG = 4.0  # cells of the drawn band that the hanging band counts as

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from sling2sim2real.base.layout import Layout
-from sling2sim2real.identification.search.regions import Region, save_regions
+from sling2sim2real.identification.searches.regions import Region, save_regions
 from sling2sim2real.launching.trials.measured import Measured, save_scores
 from sling2sim2real.settings import Params
 from sling2sim2real.settings.identification import LAWS

@@ -16,7 +16,7 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import replacing_folder
 from sling2sim2real.base.layout import Layout, NotMade
 from sling2sim2real.recording.build import build_episodes
-from sling2sim2real.recording.input.bag import once
+from sling2sim2real.recording.files import once
 from stages.start import run, started
 
 

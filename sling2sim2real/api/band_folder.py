@@ -35,8 +35,8 @@ from sling2sim2real.base.fingerprint import fingerprint
 from sling2sim2real.base.launches_file import LaunchRow, read_launches
 from sling2sim2real.base.layout import NotMade
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.recording.input.bag import sha256
-from sling2sim2real.recording.masks.folder import masks_beside
+from sling2sim2real.recording.files import SUFFIXES, sha256
+from sling2sim2real.recording.mask_folder import masks_beside
 
 BANDS = Path("bands")  # in the working folder
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
@@ -194,10 +194,13 @@ class BandFolder:
     @property
     def recordings(self) -> list[Path]:
         """All, by name: files, and folders of split bags."""
-        folder = self.path / "recordings"
-        split = {part.parent for part in folder.glob("*/*.mcap*") if part.parent.name[0] != "."}
-        files = (file for file in folder.glob("*.mcap") if file.is_file())
-        return sorted({*files, *split})
+        there = sorted((self.path / "recordings").glob("[!.]*"))
+        return [
+            place
+            for place in there
+            if (place.is_file() and place.suffix in SUFFIXES)
+            or (place.is_dir() and any(part.suffix in SUFFIXES for part in place.iterdir()))
+        ]
 
     @cached_property
     def launches(self) -> list[LaunchRow]:

@@ -20,7 +20,7 @@ from sling2sim2real.api.identification import Identification
 from sling2sim2real.api.launching import Aim, Hazard, Launch
 from sling2sim2real.cli import arguments as kinds
 from sling2sim2real.cli.plan.hand import along_pull, quaternion
-from sling2sim2real.recording.input.frames import Transform
+from sling2sim2real.recording.transforms import Transform
 
 NO_POSE = (
     "no pose of the hand in the robot's base: no recording says where the fork stands there;"

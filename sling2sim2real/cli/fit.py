@@ -35,8 +35,8 @@ from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.posterior.launches import Observed
 from sling2sim2real.identification.results.mounting import Mounting
 from sling2sim2real.launching.surface.stored import BandPolicy
-from sling2sim2real.recording.input import bag
-from sling2sim2real.recording.masks.folder import MASK_NAME, masks_beside
+from sling2sim2real.recording import files as bag
+from sling2sim2real.recording.mask_folder import MASK_NAME, masks_beside
 
 RECORDING, START, DENSITY = "recordings to episodes", "exploration", "density"
 POLICY, CARD = "policy", "card"
@@ -184,8 +184,9 @@ def _bring_in(
 def _target(folder: BandFolder, recording: Path) -> Path:
     """Where a recording goes: a split bag as a folder. Raises UserError where the name is taken."""
     name = bag.name_of(recording)
-    split = len(bag.parts_of(recording)) > 1
-    target = folder.path / "recordings" / (name.replace(".", "_") if split else f"{name}.mcap")
+    parts = bag.parts_of(recording)
+    suffix = Path(bag.PACKED_NAME.sub("", parts[0].name)).suffix
+    target = folder.path / "recordings" / f"{name.replace('.', '_')}{suffix * (len(parts) == 1)}"
     if target.exists():
         raise UserError(f"{target}: is another recording; give {recording} another name")
     return target

@@ -24,8 +24,8 @@ from sling2sim2real.api.band_folder import (
     write_yaml,
 )
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.input.frames import Transform
-from sling2sim2real.recording.loop import SURE, TOUCH, Loop
+from sling2sim2real.recording.frames import SURE, TOUCH, Loop
+from sling2sim2real.recording.transforms import Transform
 from sling2sim2real.settings.lab import SetupParams
 
 UPRIGHT = (0.0, 0.0, 1.0)

@@ -26,8 +26,8 @@ from sling2sim2real.cli.plan.hand import along_pull, quaternion
 from sling2sim2real.cli.plan.pull import hanging_middle, trajectory_of
 from sling2sim2real.cli.plan.trajectory import Trajectory
 from sling2sim2real.cli.preflight.check import MASS, expect_long
-from sling2sim2real.recording.geometry import FORK
-from sling2sim2real.recording.input.frames import Transform
+from sling2sim2real.recording.frames import FORK
+from sling2sim2real.recording.transforms import Transform
 from sling2sim2real.settings import Params
 from sling2sim2real.settings.lab import Gripper
 

@@ -1,6 +1,6 @@
 """Write one band's card: can it be trusted, its values, three draws, pictures, what would help.
 
-    python -m stages.card band1 least_squares
+    python -m stages.card band1 posterior
 
 Reads the band's recordings, episodes, mounting, θ, confidence, policy and trials; writes
 reports/bands/<band>/.

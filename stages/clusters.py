@@ -1,6 +1,6 @@
 """Choose the distinct regions of an exploration, with their covariances.
 
-    python -m stages.clusters band1 sling2sim2real
+    python -m stages.clusters band1 paper
 
 Reads data/history/<band>/<method>.parquet; writes data/clusters/<band>/<method>.json. A CMA-ES will
 start in each region.

@@ -1,6 +1,6 @@
 """Refine the regions of an exploration by a CMA-ES in each.
 
-    python -m stages.cma band1 sling2sim2real
+    python -m stages.cma band1 paper
 
 Reads data/history/ and data/clusters/ of the method, data/episodes/<band>/ and
 data/clamps/<band>.json; writes everything evaluated, the exploration too, to

@@ -1,6 +1,6 @@
 """Fit one density to all recordings of a band and to the launches that are evidence.
 
-    python -m stages.density band1 least_squares
+    python -m stages.density band1 posterior
 
 Starts at the best point of data/history/<band>/<method>.parquet. Reads data/episodes/<band>/,
 data/clamps/<band>.json and data/launches/<band>/observed.json. Writes the exploration and the mode

@@ -1,6 +1,6 @@
 """Explore the whole box of parameters; keep everything evaluated.
 
-    python -m stages.history band1 sling2sim2real
+    python -m stages.history band1 paper
 
 By differential evolution for a multistart, by one design for the density, which is fitted from its
 best point. Reads data/episodes/<band>/ and data/clamps/<band>.json; writes

@@ -1,6 +1,6 @@
 """Launch on the virtual rig with the policy of one band and method.
 
-    python -m stages.launches band1 sling2sim2real
+    python -m stages.launches band1 paper
 
 Reads the policy in data/policies/<band>/<method>/, and writes launches.parquet beside it: launches
 of equal target and number have the same errors, for every method and policy.

@@ -1,6 +1,6 @@
 """Train, check and export the slingshot policies of one band and method.
 
-    python -m stages.policy band1 sling2sim2real
+    python -m stages.policy band1 paper
 
 Reads data/theta/<band>/<method>.json; writes data/policies/<band>/<method>/: policy.onnx (metres
 to metres), card.json, map.parquet (launches over the box) and training.parquet.

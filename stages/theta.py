@@ -1,6 +1,6 @@
 """Choose θ* from everything that a search evaluated.
 
-    python -m stages.theta band1 sling2sim2real
+    python -m stages.theta band1 paper
 
 Reads data/evaluations/ and data/confidence/ of the method; writes data/theta/<band>/<method>.json.
 θ* is the mode of the density where one was fitted, which alone says how sure θ* is; else it is the

@@ -1,6 +1,6 @@
 """Predict what the policy of one band and method launches, beside what it led to.
 
-    python -m stages.trials band1 sling2sim2real
+    python -m stages.trials band1 paper
 
 Reads data/policies/, data/theta/, data/confidence/, data/clamps/ and data/episodes/, and the
 band's data/launches/<band>/scores.json; writes data/trials/<band>/<method>.parquet. A rig band has

@@ -22,7 +22,7 @@ from tests.project import ROOT, contents, until
 from validation.projects import TINY, MarkedRun, ProjectCopy, copy_project, run_of
 
 pytestmark = pytest.mark.slow
-METHODS = ["least_squares", "sling2sim2real"]
+METHODS = ["posterior", "paper"]
 OURS, PAPER = METHODS
 OWN = "mine"  # a band of the user's own, by the first method alone
 SEARCH = {OURS: ["history", "density"], PAPER: ["history", "clusters", "cma"], "bo": ["bo"]}
@@ -170,8 +170,8 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
     content = YAML(typ="safe").load(project.folder / "params.yaml")
     keys = {f"{section}.{key}" for section, value in content.items() for key in value}
     keys -= {f"methods.{name}" for name in content["methods"]} - {
-        "methods.sling2sim2real",
-        "methods.least_squares",
+        "methods.paper",
+        "methods.posterior",
     }
     keys -= {
         f"run.{key}" for key in ("rig", "own", "dips", "steps", "own_steps", "ablations")
@@ -225,7 +225,7 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
         "--force",
         "--no-run-cache",
         "--downstream",
-        "history@band1-sling2sim2real",  # of one phase: tests/identification/search/test_loop.py
+        "history@band1-paper",  # of one phase: tests/identification/search/test_loop.py
     )
     assert ran == {*of_method(PAPER), "report"}
     assert (project.folder / "dvc.lock").read_text() == before
@@ -317,12 +317,12 @@ CHANGES = {
     "optimizer.delta": after_clusters({"optimizer.delta": 0.11}),
     "optimizer.cma_population": Change(
         {"optimizer.cma_population": 5},
-        {"cma@band1-sling2sim2real", "report"},
+        {"cma@band1-paper", "report"},
         of_method(PAPER, "theta"),
     ),
     "optimizer.cma_rollouts": Change(
         {"optimizer.cma_rollouts": 10},
-        {"cma@band1-sling2sim2real", "ablation_bo@band1-bo", "report"},
+        {"cma@band1-paper", "ablation_bo@band1-bo", "report"},
         {*of_method(PAPER, "theta"), *of_method("bo", "theta")},
     ),
     "optimizer.generations": Change(

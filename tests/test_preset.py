@@ -55,7 +55,7 @@ def test_the_papers_preset_has_no_method_of_ours_and_searches_the_whole_box(tmp_
     assert {method.law for method in run} == {"neo_hookean"} and not any(
         method.bounds for method in run
     )
-    assert not params.methods["sling2sim2real"].fixed
+    assert not params.methods["paper"].fixed
 
 
 def test_what_is_no_preset_or_spoils_params_is_refused_and_nothing_changes(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ elastic laws that no other rubber has, and every second one softens, half of the
 (rig/physics/rubber.py), which no other does either.
 
 The rules, written before any of these sealed rubbers was run:
-- least_squares is the default method, if over the develop rubbers (three recordings each) and the
+- posterior is the default method, if over the develop rubbers (three recordings each) and the
   rig's bands (five each) the mean over bands of |bias| is less than that of the paper's method on
   the same recordings; else the paper's. bias is the mean error without launch noise of nine
   targets, as validation/density.py scores it.

@@ -211,7 +211,7 @@ def _identified(findings: Findings):
         yield Reason(
             False,
             "This method does not tell how sure its values are.",
-            "Put `least_squares` first under `run.methods` in params.yaml: it tells.",
+            "Put `posterior` first under `run.methods` in params.yaml: it tells.",
         )
     elif not findings.settled:
         yield Reason(

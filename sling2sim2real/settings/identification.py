@@ -27,12 +27,12 @@ LAWS: dict[str, dict[str, tuple[float, float]]] = {
         "log_flow_rate": (-1.0, 6.0),
     },
 }
-LEAST_SQUARES = "least_squares"
+POSTERIOR = "posterior"
 UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
-SEARCHES = ("multistart", LEAST_SQUARES, "de", "bo", "adam")
+SEARCHES = ("multistart", POSTERIOR, "de", "bo", "adam")
 STEPS = {  # stages of a search before `theta`; a class of the user's has `search`
     "multistart": ("history", "clusters", "cma"),
-    LEAST_SQUARES: ("history", "density"),
+    POSTERIOR: ("history", "density"),
     **{name: (name,) for name in ("de", "bo", "adam")},
 }
 OUR_ENGINE = "sling"
@@ -193,19 +193,19 @@ class MethodParams(MethodDefaults):
         return self
 
     @model_validator(mode="after")
-    def _least_squares_fixes_the_unseen(self) -> MethodParams:
-        if self.search != LEAST_SQUARES:
+    def _posterior_fixes_the_unseen(self) -> MethodParams:
+        if self.search != POSTERIOR:
             return self
         more = {*self.fixed} - {*UNSEEN}
         if not (more <= {*LAWS[self.law]} and {*UNSEEN} <= {*self.fixed}):
             raise refusal(
-                f"search: {LEAST_SQUARES} wants `fixed` to name {', '.join(UNSEEN)}, which no pull"
+                f"search: {POSTERIOR} wants `fixed` to name {', '.join(UNSEEN)}, which no pull"
                 " shows, and besides them no more than what its law adds"
             )
         if self.settings:
-            raise refusal(f"settings: {LEAST_SQUARES} has none")
+            raise refusal(f"settings: {POSTERIOR} has none")
         if self.engine != OUR_ENGINE:
-            raise refusal(f"search: {LEAST_SQUARES} wants engine: {OUR_ENGINE}")
+            raise refusal(f"search: {POSTERIOR} wants engine: {OUR_ENGINE}")
         return self
 
     @model_validator(mode="after")

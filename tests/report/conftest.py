@@ -21,7 +21,7 @@ from tests.project import DEFAULTS, write_params_of
 from tests.report import toy_launches
 from tests.report.toy_replay import toy_landscape, toy_replay
 
-BAND, METHOD = "toy", "sling2sim2real"
+BAND, METHOD = "toy", "paper"
 THETA = {
     "youngs_modulus": 3e5,
     "poissons_ratio": 0.45,

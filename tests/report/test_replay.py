@@ -18,7 +18,7 @@ from tests.project import DEFAULTS
 
 pytestmark = pytest.mark.usefixtures("nowhere")
 
-METHOD = "sling2sim2real"
+METHOD = "paper"
 THETA = dict(zip(NAMES, (3e5, 0.46, 4e-3, 0.5, 0.6), strict=True))
 SHIFT = np.array([0, 0.05, 0])  # of the clouds from where the band is
 

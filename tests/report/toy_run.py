@@ -18,7 +18,7 @@ from tests.report.conftest import BAND, METHOD, THETA, confidence
 from tests.report.conftest import launches as mixed
 from tests.report.toy_launches import floor, launches
 
-OURS = "least_squares"
+OURS = "posterior"
 METHODS = OURS, METHOD, "real2sim2real", "package_si"
 ABLATIONS = "de", "no_work"
 RIG = "band1", "band2"

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from rig.draw import OF_LAUNCHES, sampled
 from sling2sim2real.identification.posterior.likelihood import Tolerances
 from sling2sim2real.settings import Params
-from sling2sim2real.settings.identification import LEAST_SQUARES
+from sling2sim2real.settings.identification import POSTERIOR
 from tests.project import with_
 
 
@@ -62,7 +62,7 @@ ASSUMED = {  # of the identification and the lab, and the rig's number that it s
 
 
 def test_no_assumption_of_the_identification_is_the_rigs_number(params: Params) -> None:
-    assumed = asdict(Tolerances()) | params.methods[LEAST_SQUARES].fixed | dict(params.setup)
+    assumed = asdict(Tolerances()) | params.methods[POSTERIOR].fixed | dict(params.setup)
     for name, key in ASSUMED.items():
         hidden = value_of(params, key), value_of(sampled(params, "band1"), key)
         assert assumed[name] not in (*hidden, *params.rig.draws[key]), name

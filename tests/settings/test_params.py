@@ -134,7 +134,7 @@ REFUSED = [
     ("run.bands", ["band1", "band1"], "run.bands: lists an entry twice"),
     ("run.bands", [], "run.bands: must not be empty"),
     ("run.methods", ["best"], "run.methods: best is not one of"),
-    ("run.ablations.methods", ["sling2sim2real"], "ablations.methods: sling2sim2real is one"),
+    ("run.ablations.methods", ["paper"], "ablations.methods: paper is one"),
     ("run.ablations.bands", ["other"], "run.ablations.bands: other is not one of run.bands"),
     ("rig.bands", {}, "rig.bands: lacks band1"),
     ("rig.bands.band1.law", "mooney", "rig.bands.band1.law: must be 'ogden'"),
@@ -174,12 +174,12 @@ REFUSED = [
     ("loss", 3, "loss: must be a mapping"),
     ("weather", 3, "weather: unknown key"),
     ("methods.de.weights", NOTHING, "methods.de.weights: at least one weight"),
-    ("methods.de.search", "cmaes", "methods.de.search: must be multistart, least_squares, de"),
+    ("methods.de.search", "cmaes", "methods.de.search: must be multistart, posterior, de"),
     ("methods.de.search", "my.module:", "or package.module:Class, got 'my.module:'"),
     ("methods.no_work.settings", {"rate": 1}, "methods.no_work: settings are for another"),
     ("methods.de.settings", {"seed": 3}, "methods.de: settings: seed stands under `optimizer`"),
     ("methods.de", CONTENT["methods"]["de"] | NARROW, "must be between 0.45 and 0.49, got 0.4"),
-    ("methods.least_squares.fixed", {}, "wants `fixed` to name poissons_ratio, dynamic_friction"),
+    ("methods.posterior.fixed", {}, "wants `fixed` to name poissons_ratio, dynamic_friction"),
     ("setup.tool", {"weight": 0.7}, "setup.tool.weight: unknown key, the closest known one is"),
     ("run.own", ["band1"], "own: band1 is one of run.bands already"),
     ("methods.de.bounds", {"air_drag": [0.0, 1.0]}, "air_drag is not one of youngs_modulus"),
@@ -224,7 +224,7 @@ def test_what_a_method_leaves_out_is_as_the_defaults_say() -> None:
     assert (method.settings, method.fixed, method.bounds) == ({}, {}, {})
     other = check(changed(("method_defaults", "bounds"), {"poissons_ratio": [0.4, 0.49]})).methods
     assert other["no_work"].bounds == {"poissons_ratio": (0.4, 0.49)}
-    assert set(other["least_squares"].bounds) == {*LAWS["rubber"]}
+    assert set(other["posterior"].bounds) == {*LAWS["rubber"]}
     without = {key: value for key, value in CONTENT.items() if key != "method_defaults"}
     assert refusal(without) == "params.yaml: method_defaults: is missing"
     assert refusal(changed(("method_defaults", "k_top"), 0)).startswith(
@@ -244,7 +244,7 @@ def test_the_steps_of_a_run_are_those_of_its_methods_searches() -> None:
     assert stepped(changed(("trials", "repeats"), 3))["run"] == CONTENT["run"]
     assert refusal(changed(("run", "steps", "clusters"), [])) == (
         "params.yaml: run.steps.clusters: must list those of run.methods whose search has this"
-        " step: [sling2sim2real]"
+        " step: [paper]"
     )
     output = refusal(changed(("methods", "de"), CONTENT["methods"]["bo"]))
     assert "run.ablations.steps.de: must list those of run.ablations.methods" in output
@@ -263,7 +263,7 @@ def test_what_a_method_may_ask_for() -> None:
     section = {"search": "lab.search:Own", "settings": {"rate": 0.1, "steps": 3, "name": "x"}}
     whole = stepped(changed(("methods", "de"), base | section))
     assert check(whole).methods["de"].settings["rate"] == 0.1
-    rubber = {"law": "rubber", "bounds": CONTENT["methods"]["least_squares"]["bounds"]}
+    rubber = {"law": "rubber", "bounds": CONTENT["methods"]["posterior"]["bounds"]}
     rubber |= {"fixed": ALL_FIXED | {"softening": 0.0}}  # the rest of what the law adds is left
     assert len(check(changed(("methods", "de"), base | rubber)).methods["de"].fixed) == 6
 

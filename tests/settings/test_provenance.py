@@ -14,13 +14,13 @@ from sling2sim2real.settings.provenance import (
 )
 from tests.project import ROOT
 
-BAND, METHOD = "band1", "least_squares"
+BAND, METHOD = "band1", "posterior"
 
 
 def test_settings_are_values_by_their_keys_and_survive_json(params) -> None:
     values = settings_of(params, BAND, METHOD)
     assert values["setup.fork_width"] == 0.275 and values["bands.band1.mass"] == 0.023
-    assert values["methods.least_squares.law"] == params.methods[METHOD].law
+    assert values["methods.posterior.law"] == params.methods[METHOD].law
     for settings in (values, policy_settings_of(params, BAND)):
         assert changes(json.loads(json.dumps(settings)), settings) == []
 

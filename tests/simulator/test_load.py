@@ -29,7 +29,7 @@ def mounting_of(sling) -> tuple:
 
 
 def test_a_method_takes_what_the_recording_showed_or_leaves_it_out(root: Path) -> None:
-    method = PARAMS.methods["sling2sim2real"]
+    method = PARAMS.methods["paper"]
     methods = {"with": method, "without": method.model_copy(update={"mounting": False})}
     params = PARAMS.model_copy(update={"methods": methods})
     assert mounting_of(sling_of_method(params, "band1", "with", root)) == tuple(SHOWN.values())

@@ -53,7 +53,7 @@ def test_wrong_arguments_are_answered_by_the_usage(stage) -> None:
 
 
 def test_unknown_names(stage) -> None:
-    status, line = stage("history", "band9", "sling2sim2real")
+    status, line = stage("history", "band9", "paper")
     assert status == 1 and line.startswith("error: band band9: not in params.yaml, which has band1")
     status, line = stage("theta", "band1", "best")
     assert status == 1 and line.startswith("error: method best: not in params.yaml, which has")
@@ -64,16 +64,14 @@ def test_a_history_that_failed_says_why(stage) -> None:
     unit = np.random.default_rng(1).random((30, 5))
     nothing = {term: np.full(30, np.nan) for term in TERMS}
     theta, reasons = space.to_physical(unit), ["the band slipped"] * 30
-    history = Evaluations("sling2sim2real", space.names)
+    history = Evaluations("paper", space.names)
     history.add(
         Evaluation(unit, theta, nothing, np.full(30, np.inf), reasons), phase="de", generation=0
     )
-    history.save(Path("data/history/band1/sling2sim2real.parquet"))
-    status, line = stage("clusters", "band1", "sling2sim2real")
+    history.save(Path("data/history/band1/paper.parquet"))
+    status, line = stage("clusters", "band1", "paper")
     assert status == 1
-    assert line.startswith(
-        "error: sling2sim2real: each of 30 simulations failed (the band slipped)"
-    )
+    assert line.startswith("error: paper: each of 30 simulations failed (the band slipped)")
 
 
 def test_a_hint_names_the_group_by_which_a_method_runs(stage) -> None:
@@ -81,7 +79,7 @@ def test_a_hint_names_the_group_by_which_a_method_runs(stage) -> None:
     path = Path("params.yaml")
     run = load(path).run.ablations
     assert "band1" in run.bands and {"de", "adam"} <= set(run.methods)
-    for method, group in (("sling2sim2real", "cma"), ("de", "ablation_de")):
+    for method, group in (("paper", "cma"), ("de", "ablation_de")):
         _, line = stage("theta", "band1", method)
         assert line.endswith(f"missing; `dvc repro {group}@band1-{method}` makes it")
     _, line = stage("theta", "band2", "adam")
@@ -89,7 +87,7 @@ def test_a_hint_names_the_group_by_which_a_method_runs(stage) -> None:
 
 
 def test_missing_inputs(stage) -> None:
-    both = "band1", "sling2sim2real"
+    both = "band1", "paper"
     for item, names in ((both[:1], OF_A_BAND[1:]), (both, OF_A_METHOD), ((), ["report"])):
         for name in names:
             status, line = stage(name, *item)
@@ -107,15 +105,15 @@ def test_a_file_that_is_missing_or_damaged_says_what_makes_it(stage) -> None:
         "/data/x/data/confidence/band1/de.json": "ablation_de@band1-de",
         "data/launches/band1/observed.json": "evidence@band1",
         "data/policies/band1/adam/launches.parquet": "ablation_launches@band1-adam",
-        "data/policies/band2/sling2sim2real/card.json": "policy@band2-sling2sim2real",
+        "data/policies/band2/paper/card.json": "policy@band2-paper",
         **{
             f"data/{step}/band1/de.parquet": f"ablation_{step}@band1-de"
             for step in ("theta", "trials")
         },
         "data/history/band1/no_work.parquet": "ablation_history@band1-no_work",
-        "data/clusters/band2/sling2sim2real.json": "clusters@band2-sling2sim2real",
-        "data/evaluations/band2/sling2sim2real.parquet": "cma@band2-sling2sim2real",
-        "data/evaluations/band2/least_squares.parquet": "density@band2-least_squares",
+        "data/clusters/band2/paper.json": "clusters@band2-paper",
+        "data/evaluations/band2/paper.parquet": "cma@band2-paper",
+        "data/evaluations/band2/posterior.parquet": "density@band2-posterior",
         "data/evaluations/band1/package_si.parquet": "bo@band1-package_si",
     }
     for path, makes in cases.items():

@@ -29,7 +29,7 @@ def test_what_a_method_leaves_out_is_left_out_everywhere(
     yaml = YAML()
     content = yaml.load(DEFAULTS)
     content["optimizer"].update({**BUDGET, "cma_rollouts": 4})
-    content["methods"]["sling2sim2real"]["mounting"] = mounting
+    content["methods"]["paper"]["mounting"] = mounting
     yaml.dump(content, tmp_path / "params.yaml")
     params, layout = load(), Layout()
     sling, episode = recorded_yardstick(params)
@@ -37,14 +37,14 @@ def test_what_a_method_leaves_out_is_left_out_everywhere(
     episode = own_law_episode(sling, episode, truth, cutoff=35.0)
     episode.save(layout.episode("band1"))
     write_json(layout.clamps("band1"), SHOWN)
-    monkeypatch.setattr(sys, "argv", ["stage", "band1", "sling2sim2real"])
+    monkeypatch.setattr(sys, "argv", ["stage", "band1", "paper"])
     for stage in ("history", "clusters", "cma", "theta"):
         with pytest.raises(SystemExit) as ended:
             runpy.run_module(f"stages.{stage}", run_name="__main__")
         assert not ended.value.code
-    path = layout.theta("band1", "sling2sim2real")
+    path = layout.theta("band1", "paper")
     saved = load_theta(path, "band1")
     assert json.loads(path.read_text()).get("mounted") == (None if mounting else False)
     assert (calibrated(params, "band1", saved).flexural_rigidity == 2e-3) == mounting
-    summary = Identification.of_run("band1", "sling2sim2real")
+    summary = Identification.of_run("band1", "paper")
     assert (summary.mounting is not None) == mounting

@@ -8,7 +8,7 @@ from typing import Any
 from sling2sim2real.base.errors import UserError, one_line
 from sling2sim2real.base.imported import imported
 from sling2sim2real.identification.search.loop import Optimizer
-from sling2sim2real.settings.identification import LEAST_SQUARES, MethodParams, OptimizerParams
+from sling2sim2real.settings.identification import POSTERIOR, MethodParams, OptimizerParams
 
 OURS = {
     "design": "sling2sim2real.identification.optimizers.design.design:Design",
@@ -33,7 +33,7 @@ def explorer(
     Raises:
         UserError: As `build`.
     """
-    name = {"multistart": "de", LEAST_SQUARES: "design"}.get(method.search, method.search)
+    name = {"multistart": "de", POSTERIOR: "design"}.get(method.search, method.search)
     settings: dict[str, Any] = dict(method.settings)
     if name == "de":
         moves = {"mutation": optimizer.mutation, "recombination": optimizer.recombination}

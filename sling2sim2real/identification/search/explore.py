@@ -12,7 +12,7 @@ from sling2sim2real.identification.search.build import explorer
 from sling2sim2real.identification.search.evaluations import Evaluations
 from sling2sim2real.identification.search.loop import search
 from sling2sim2real.settings import Params
-from sling2sim2real.settings.identification import LEAST_SQUARES
+from sling2sim2real.settings.identification import POSTERIOR
 
 
 def rollouts_of(params: Params, method: str) -> int:
@@ -22,7 +22,7 @@ def rollouts_of(params: Params, method: str) -> int:
     """
     optimizer = params.optimizer
     count = optimizer.population * (optimizer.generations + 1)
-    if params.methods[method].search in ("multistart", LEAST_SQUARES):
+    if params.methods[method].search in ("multistart", POSTERIOR):
         return count
     return count + optimizer.cma_rollouts
 

@@ -21,7 +21,7 @@ OWN = "tests.identification.search.own:RandomSearch"
 def method(**more):
     """params.yaml's optimiser, and its method sling2sim2real with other keys."""
     params = parse(TEXT)
-    method_params = params.methods["sling2sim2real"].model_copy(update=more)
+    method_params = params.methods["paper"].model_copy(update=more)
     return method_params, params.optimizer
 
 

@@ -1,6 +1,6 @@
-"""Write one band's card: can it be trusted, its values, three draws, pictures, what would help.
+"""Write the card of a band as one recording shows it: can it be trusted, its values, three draws, pictures, what would help.
 
-    python -m stages.card band1 posterior
+    python -m stages.card band1
 
 Reads the band's recordings, episodes, mounting, θ, confidence, policy and trials; writes
 reports/bands/<band>/.
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.card.write import write
-from stages.start import run, started
+from stages.start import recording_of_stage, run
 
 
 def main() -> None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from typing import Annotated, Generic, Literal, TypeVar
 
 from pydantic import AfterValidator, model_validator
 
 from sling2sim2real.base.imported import is_import
 from sling2sim2real.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
-from sling2sim2real.settings.lab import StepParams
 
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound", bound=float)
@@ -30,11 +28,7 @@ LAWS: dict[str, dict[str, tuple[float, float]]] = {
 POSTERIOR = "posterior"
 UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
 SEARCHES = ("multistart", POSTERIOR, "de", "bo", "adam")
-STEPS = {  # stages of a search before `theta`; a class of the user's has `search`
-    "multistart": ("history", "clusters", "cma"),
-    POSTERIOR: ("history", "density"),
-    **{name: (name,) for name in ("de", "bo", "adam")},
-}
+OWN = "own"  # any other: a class of the user's
 OUR_ENGINE = "sling"
 ENGINES = OUR_ENGINE, "physx"
 
@@ -222,23 +216,6 @@ class MethodParams(MethodDefaults):
 def parameter_names(law: str) -> tuple[str, ...]:
     """The parameters of a law, in the order of all tables: θ, then what the law adds."""
     return (*ParameterBoxes.model_fields, *LAWS[law])
-
-
-def methods_by_step(
-    methods: Iterable[str], methods_params: Mapping[str, MethodParams]
-) -> dict[str, list]:
-    """What `run.steps` must hold for `methods`, each of which is in `known`."""
-    by_step: dict[str, list] = {step: [] for step in StepParams.model_fields}
-    for name in methods:
-        for step in steps_of(methods_params[name].search):
-            if step in by_step:  # `cma` has the list of `clusters`
-                by_step[step].append(name)
-    return by_step
-
-
-def steps_of(search: str) -> tuple[str, ...]:
-    """The stages of a search, the last of which writes its evaluations."""
-    return STEPS.get(search, ("search",))
 
 
 def check_method(

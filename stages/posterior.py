@@ -1,0 +1,54 @@
+"""Fit one density to all episodes of a recording and to the launches that are to fit.
+
+    python -m stages.posterior band1-posterior
+
+Starts at the best point of data/history/<pair>.parquet. Reads data/episodes/ and data/clamps/ of
+the pair's recording, and data/launches/<band>.csv. Writes the exploration and the mode to
+data/evaluations/<pair>.parquet; intervals, and samples of them, to data/confidence/<pair>.json.
+"""
+
+from __future__ import annotations
+
+from pipeline.layout import Layout
+from sling2sim2real.base.launches import read_launches
+from sling2sim2real.base.layout import made
+from sling2sim2real.base.machine import workers
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.identification.density import entries_of, evaluated_mode
+from sling2sim2real.identification.posterior.evidence import evidence_of
+from sling2sim2real.identification.posterior.identify import fit_posterior
+from sling2sim2real.identification.results.confidence_file import save_confidence
+from sling2sim2real.identification.results.mounting import sling_of_method
+from sling2sim2real.identification.search.evaluations import Evaluations
+from sling2sim2real.settings.identification import parameter_names
+from stages.start import pair_of_stage, run
+
+
+def main() -> None:
+    params, pair = pair_of_stage()
+    layout, method, law = Layout(), pair.method, params.methods[pair.method].law
+    explored = Evaluations.load(method, parameter_names(law), made(layout.history(pair)))
+    sling = sling_of_method(params, pair.band, method, layout.clamps(pair))
+    episodes = Episode.load_all(layout.episodes(pair))
+    evidence = evidence_of(read_launches(layout.launches(pair.band)), params)
+    density = fit_posterior(
+        params,
+        method,
+        sling,
+        episodes,
+        explored.best_parameters(law),
+        evidence=evidence,
+        workers=workers(),
+        progress=lambda fit: print(
+            f"{pair.key}: expansion {fit.steps}, misfit {fit.misfit:.2f}", flush=True
+        ),
+    )
+    mode = evaluated_mode(params, method, sling, episodes[0], density)
+    explored.followed_by(mode).save(layout.evaluations(pair))
+    entries, samples = entries_of(density, explored), density.parameters
+    entries["made_with"] = evidence.made_with if evidence else {}
+    save_confidence(layout.confidence(pair), pair.band, entries, samples)
+
+
+if __name__ == "__main__":
+    run(main)

@@ -4,7 +4,8 @@
 
 Reads data/history/ and data/clusters/ of the pair, and data/episodes/ and data/clamps/ of its
 recording; writes everything evaluated, the exploration too, to data/evaluations/<pair>.parquet, and
-data/confidence/<pair>.json, which has no samples. Killed, it begins anew. SLING_DEVICE and SLING_WORKERS say where it runs.
+data/confidence/<pair>.json, which has no samples. Killed, it begins anew. SLING_DEVICE and
+SLING_WORKERS say where it runs.
 """
 
 from __future__ import annotations

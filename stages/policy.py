@@ -2,9 +2,10 @@
 
     python -m stages.policy band1-paper
 
-Reads data/theta/<pair>.json; writes data/policies/<pair>/: policy.onnx (metres to metres), card.json, map.parquet (launches over the box) and training.parquet.
-A killed training begins anew: it takes seconds.
-SLING_DEVICE says where launches are simulated; PPO runs on one thread of the CPU.
+Reads data/theta/<pair>.json, and data/clamps/ of its recording; writes data/policies/<pair>/:
+policy.onnx (metres to metres), card.json, map.parquet (launches over the box) and training.parquet.
+A killed training begins anew: it takes seconds. SLING_DEVICE says where launches are simulated; PPO
+runs on one thread of the CPU.
 """
 
 from __future__ import annotations

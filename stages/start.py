@@ -108,25 +108,26 @@ def _end_with_dvc() -> None:
 def remedy(error: NotMade) -> str:
     """Describe how a user gets a file of data/, or gets it anew; "" of any other file."""
     parts = error.path.with_suffix("").parts
-    if "data" not in parts:
-        return ""
-    folder, *names = parts[len(parts) - parts[::-1].index("data") :]
+    after = parts[::-1].index("data") if "data" in parts else 0
     run = load().run
-    key = "-".join(names[:2]).removesuffix("-plain")  # of a recording, in two folders
-    if folder == "launches":
-        return "a CSV with the header draw_y,draw_z,error,landing,use will do"
+    match parts[len(parts) - after :]:
+        case "launches", *_:
+            return "a CSV with the header draw_y,draw_z,error,landing,use will do"
+        case "raw" | "episodes" | "clamps" as folder, band, recording, *_:
+            key, entries = Recording.model_construct(band=band, recording=recording).key, run.recordings
+        case "floor" as folder, key, *_:
+            entries = run.floors
+        case folder, key, *_:
+            entries = run.pairs
+        case _:
+            return ""
     if folder == "raw" and key not in run.rig:
         return "put MCAP files there"
-    if folder in ("raw", "episodes", "clamps"):
-        step, entries = MAKERS.get(folder, folder), run.recordings
-    else:
-        step, key, entries = MAKERS.get(folder, folder), names[0], run.pairs
-    if folder == "floor":
-        entries = dict.fromkeys(run.floors)
-    if folder in ("evaluations", "confidence"):
-        step = next((LAST_OF[kind] for kind in LAST_OF if key in getattr(run, kind)), "")
     if key not in entries:
         return f"no entry of `run` in params.yaml makes {key}"
+    step = MAKERS.get(folder, folder)
+    if folder in ("evaluations", "confidence"):
+        step = next(step for kind, step in LAST_OF.items() if key in getattr(run, kind))
     if error.problem != "missing":
         return f"`dvc repro --force {step}@{key}` makes it anew"
     return f"`dvc repro {step}@{key}` makes it"

@@ -44,7 +44,7 @@ def test_launches_as_evidence_bring_their_settings(params) -> None:
 @pytest.mark.parametrize("step", ["theta", "policy"])
 def test_dvc_runs_a_stage_again_when_what_it_notes_has_changed(params, step: str) -> None:
     """Else its file would go on naming a change that `dvc repro` does not mend."""
-    listed = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"][step]["params"]
+    listed = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"][step]["do"]["params"]
     names = {"${item.band}": BAND, "${item.method}": METHOD}
     for mark, name in names.items():
         listed = [key.replace(mark, name) for key in listed]

@@ -9,18 +9,23 @@ data/evaluations/<pair>.parquet; intervals, and samples of them, to data/confide
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from pipeline.layout import Layout
-from sling2sim2real.base.launches import read_launches
 from sling2sim2real.base.layout import made
 from sling2sim2real.base.machine import workers
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.density import entries_of, evaluated_mode
-from sling2sim2real.identification.posterior.evidence import evidence_of
 from sling2sim2real.identification.posterior.identify import fit_posterior
+from sling2sim2real.identification.posterior.launches import Evidence, Observed
 from sling2sim2real.identification.results.confidence_file import save_confidence
 from sling2sim2real.identification.results.mounting import sling_of_method
 from sling2sim2real.identification.search.evaluations import Evaluations
+from sling2sim2real.launching.launches_file import FIT, read_launches
+from sling2sim2real.settings import Params
 from sling2sim2real.settings.identification import parameter_names
+from sling2sim2real.settings.provenance import evidence_settings_of
+from sling2sim2real.simulator.model import LaunchSetup
 from stages.start import pair_of_stage, run
 
 
@@ -30,7 +35,7 @@ def main() -> None:
     explored = Evaluations.load(method, parameter_names(law), made(layout.history(pair)))
     sling = sling_of_method(params, pair.band, method, layout.clamps(pair))
     episodes = Episode.load_all(layout.episodes(pair))
-    evidence = evidence_of(read_launches(layout.launches(pair.band)), params)
+    evidence = evidence_of(layout.launches(pair.band), params)
     density = fit_posterior(
         params,
         method,
@@ -48,6 +53,21 @@ def main() -> None:
     entries, samples = entries_of(density, explored), density.parameters
     entries["made_with"] = evidence.made_with if evidence else {}
     save_confidence(layout.confidence(pair), pair.band, entries, samples)
+
+
+def evidence_of(path: Path, params: Params) -> Evidence | None:
+    """The launches of a file that are to fit, and what launches them here; None without any.
+
+    A draw without an error of its own has that of a commanded one, `trials.actuation_error`.
+    """
+    usual = params.trials.actuation_error
+    observed = [
+        Observed(row.draw, usual if row.error is None else row.error, row.landing)
+        for row in read_launches(made(path))
+        if row.use == FIT and row.landing is not None
+    ]
+    setup = LaunchSetup.of(params.setup, params.sling)
+    return Evidence(observed, setup, evidence_settings_of(params)) if observed else None
 
 
 if __name__ == "__main__":

@@ -114,7 +114,10 @@ def remedy(error: NotMade) -> str:
         case "launches", *_:
             return "a CSV with the header draw_y,draw_z,error,landing,use will do"
         case "raw" | "episodes" | "clamps" as folder, band, recording, *_:
-            key, entries = Recording.model_construct(band=band, recording=recording).key, run.recordings
+            key, entries = (
+                Recording.model_construct(band=band, recording=recording).key,
+                run.recordings,
+            )
         case "floor" as folder, key, *_:
             entries = run.floors
         case folder, key, *_:

@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 
 from pipeline.layout import Layout
-from sling2sim2real.base.launches import CHECK, read_launches
 from sling2sim2real.base.layout import NotMade, made
 from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.theta import load_theta
 from sling2sim2real.identification.search.regions import Region, load_regions
+from sling2sim2real.launching.launches_file import CHECK, read_launches
 from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.settings import Params

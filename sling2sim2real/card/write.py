@@ -21,7 +21,7 @@ from sling2sim2real.settings import Params
 
 
 def write(params: Params, band: str, method: str, files: CardFiles, card_folder: Path) -> dict:
-    """Write a band's card into a folder; return what card.json says. Raises UserError: an input is missing."""
+    """Write a band's card; return what card.json says. Raises UserError: an input is missing."""
     inputs = card_inputs(params, band, method, files)
     episode, setup = inputs.episode, params.setup
     recording = files.raw / episode.metadata["input"]["file"]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
+from pipeline.layout import Layout
 from pipeline.report.replay import replay_method
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.loss import EpisodeLoss
@@ -53,7 +54,11 @@ def recorded(sling):
 def played(params, recorded):
     episode, rollouts = recorded
     theta = {"theta": THETA}
-    return episode, rollouts, replay_method(params, "band1", METHOD, episode, theta)
+    return (
+        episode,
+        rollouts,
+        replay_method(params, params.run.pairs[f"band1-{METHOD}"], episode, theta, Layout()),
+    )
 
 
 def test_the_pause_keeps_the_force_and_nothing_pulls_before_or_after(played) -> None:

@@ -15,7 +15,6 @@ from typing import Annotated
 from sling2sim2real.base import launch_table as table
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_json
-from sling2sim2real.base.launches import FIT, MeasuredLaunch
 from sling2sim2real.base.schema import LIST, JsonRecord, read_json
 from sling2sim2real.identification.posterior.launches import Evidence, Observed
 from sling2sim2real.settings import Params
@@ -109,18 +108,3 @@ def expect_error(where: str, error: float) -> float:
             f"{where}: draw_error_m must be at least 0 and below {MOST_ERROR:g} m, got {error:g}"
         )
     return error
-
-
-def evidence_of(launches: Sequence[MeasuredLaunch], params: Params) -> Evidence | None:
-    """Those launches that are to fit, and what launches them here; None without any.
-
-    A draw without an error of its own has that of a commanded one, `trials.actuation_error`.
-    """
-    error = params.trials.actuation_error
-    observed = [
-        Observed(launch.draw, error if launch.error is None else launch.error, launch.landing)
-        for launch in launches
-        if launch.use == FIT and launch.landing is not None
-    ]
-    setup = LaunchSetup.of(params.setup, params.sling)
-    return Evidence(observed, setup, evidence_settings_of(params)) if observed else None

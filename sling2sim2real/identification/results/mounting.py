@@ -29,14 +29,14 @@ def load_sling(
     """A band of params.yaml, mounted as its recording shows where that was fitted.
 
     Args:
-        clamps: File of the mounting that was fitted; none, or one that is missing: the band hangs as
-            `setup` says.
+        clamps: File of the mounting that was fitted; without one the band hangs as `setup` says.
         mounted: False leaves out what was fitted.
 
     Raises NotMade where the file of the mounting is damaged.
     """
-    fitted = mounted and clamps is not None and clamps.exists()
-    mounting = read_json(clamps, Mounting) if fitted else None
+    mounting = None
+    if mounted and clamps is not None and clamps.exists():
+        mounting = read_json(clamps, Mounting)
     return ClampedBand.of(params.bands[band], params.setup, params.sling, mounting, law=law)
 
 

@@ -15,8 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from sling2sim2real.base.files import replacing
-from sling2sim2real.base.launches import CHECK, MeasuredLaunch
 from sling2sim2real.base.pool import Pool
+from sling2sim2real.launching.launches_file import CHECK, LaunchRow
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.spread import landing_intervals
 from sling2sim2real.settings import Params
@@ -80,7 +80,7 @@ class Batch:
         return [None] * len(self.draws) if column_values is None else list(column_values)
 
 
-def scored(launches: Sequence[MeasuredLaunch], method: str) -> list[Batch]:
+def scored(launches: Sequence[LaunchRow], method: str) -> list[Batch]:
     """The launches to check a method's predictions with, if there are any."""
     chosen = [
         launch for launch in launches if launch.use == CHECK and launch.method in ("", method)

@@ -35,6 +35,13 @@ def test_each_recording_has_its_own_within_the_ranges(params: Params) -> None:
     assert all(value_of(again, key) == value_of(worlds[0], key) for key in params.rig.draws)
 
 
+def test_another_recording_of_a_band_has_other_numbers(params: Params) -> None:
+    """Those that `rig.recordings.<name>.stream` tells from others; launches are of the rubber."""
+    streams = [recording.stream for recording in params.rig.recordings.values()]
+    worlds = [sampled(params, f"band1{stream}") for stream in streams]
+    assert len({value_of(world, "pads.force") for world in worlds}) == len(streams) == 2
+
+
 def test_launches_and_recordings_share_no_draw(params: Params) -> None:
     recording, launching = sampled(params, "band1"), sampled(params, "band1", launching=True)
     for key in params.rig.draws:

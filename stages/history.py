@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from pipeline.layout import Layout
 from pipeline.session import logging_evaluator
-from sling2sim2real.identification.search.explore import explore, rollouts_of
+from sling2sim2real.identification.search import explore, rollouts_of
 from stages.start import pair_of_stage, run
 
 

@@ -359,7 +359,7 @@ CHANGES = {
         EVERYTHING - OF_MINE - of("band1", "record", "floor"),
     ),
     "the Bayesian optimiser": Change(
-        ("sling2sim2real/identification/optimizers/bo/bayes.py", "# edited\n"),
+        ("sling2sim2real/identification/searches/bo.py", "# edited\n"),
         {"search@band1-bo"},
         {*of_pair("band1", BO, "theta"), "report"},
     ),

@@ -4,8 +4,8 @@ DVC re-runs a stage when something listed changes; it cannot see Python's import
 a stage's script imports, at any depth and inside functions too, and takes the folder of each such
 file: one folder a concern. Some files are nobody's dependency, for no result depends on them but by
 what DVC tracks by itself: the models of params.yaml, which hold no default; the layout, which
-spells dvc.yaml's paths; and stages/start.py, which reads the arguments. Optimisers are found by
-name, so that no import says which of them a stage runs: their folders are listed by hand.
+spells dvc.yaml's paths; and stages/start.py, which reads the arguments. Searches are found by
+name, so that no import says which of them a stage runs: their files are listed by hand.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ sys.path.insert(0, str(ROOT))
 
 from sling2sim2real.base.code import CODE, UNTRACKED, closure, concern  # noqa: E402
 
-BY_NAME = "sling2sim2real/identification/optimizers/"
+SEARCHES = "sling2sim2real/identification/searches"
+BY_NAME = {"history": f"{SEARCHES}/de.py", "search": f"{SEARCHES}/${{item.search}}.py"}
 
 
 def folders(script: Path, root: Path = ROOT) -> list[str]:
@@ -47,8 +48,7 @@ def main() -> int:
     stale = False
     for name, stage in stages().items():
         listed = {dep for dep in stage["deps"] if dep.startswith(CODE)}
-        listed = {dep for dep in listed if not dep.startswith(BY_NAME)}
-        run = {dep for dep in folders(script_of(stage)) if not dep.startswith(BY_NAME)}
+        run = {*folders(script_of(stage)), *filter(None, [BY_NAME.get(name)])}
         for part in sorted(listed ^ run):
             print(f"{name}: {'-' if part in listed else '+'} {part}")
             stale = True

@@ -28,7 +28,7 @@ LAWS: dict[str, dict[str, tuple[float, float]]] = {
 POSTERIOR = "posterior"
 UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
 SEARCHES = ("multistart", POSTERIOR, "de", "bo", "adam")
-OWN = "own"  # any other: a class of the user's
+OWN = "own"  # any other: a function of the user's
 OUR_ENGINE = "sling"
 ENGINES = OUR_ENGINE, "physx"
 
@@ -160,7 +160,7 @@ class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
     law: Law
-    search: Annotated[str, _one_of(SEARCHES, "Class")]
+    search: Annotated[str, _one_of(SEARCHES, "function")]
     engine: Annotated[str, _one_of(ENGINES, "function")]
     settings: dict[str, Setting]
     fixed: dict[str, Value]

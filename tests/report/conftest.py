@@ -12,7 +12,7 @@ from pipeline.report import report as reporting
 from pipeline.report import write as writing
 from pipeline.report.results import Result, Results, gather
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.search.regions import Region, save_regions
+from sling2sim2real.identification.searches.regions import Region, save_regions
 from sling2sim2real.launching.launches_file import write_launches
 from sling2sim2real.settings import load
 from sling2sim2real.simulator.parameters import THETA as NAMES

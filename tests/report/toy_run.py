@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.layout import Layout
-from sling2sim2real.identification.search.regions import Region, save_regions
+from sling2sim2real.identification.searches.regions import Region, save_regions
 from sling2sim2real.launching.launches_file import COLUMNS, MORE
 from sling2sim2real.settings import Params, load
 from sling2sim2real.settings.identification import LAWS

@@ -7,7 +7,7 @@ import numpy as np
 from sling2sim2real.base.progress import Progress, parse
 from sling2sim2real.identification.objective.session import LoggingEvaluator
 from sling2sim2real.settings import load
-from tests.identification.search.functions import Evaluate, rosenbrock
+from tests.identification.searches.functions import Evaluate, rosenbrock
 from tests.project import DEFAULTS
 
 PARAMS = load(DEFAULTS)

@@ -1,1 +1,0 @@
-"""A class of the user's lies elsewhere: after a change of it `dvc repro --force` runs it again."""

@@ -11,9 +11,10 @@ SLING_WORKERS say where it runs.
 from __future__ import annotations
 
 from pipeline.layout import Layout
-from pipeline.session import episode_of, logging_evaluator
 from sling2sim2real.base.layout import made
+from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.evaluations import Evaluations
+from sling2sim2real.identification.objective.session import logging_evaluator
 from sling2sim2real.identification.results.confidence_file import law_entries, save_confidence
 from sling2sim2real.identification.searches.cma_es import refine
 from sling2sim2real.identification.searches.regions import load_regions
@@ -26,10 +27,12 @@ def main() -> None:
     method, law, layout = pair.method, params.methods[pair.method].law, Layout()
     regions, _ = load_regions(made(layout.clusters(pair)))
     explored = Evaluations.load(method, parameter_names(law), made(layout.history(pair)))
-    evaluate = logging_evaluator("cma", pair, params, params.optimizer.cma_rollouts)
+    episode, rollouts = Episode.load(layout.episode(pair)), params.optimizer.cma_rollouts
+    recorded = pair.band, method, episode, layout.clamps(pair)
+    evaluate = logging_evaluator(f"cma-{pair.key}", params, *recorded, rollouts)
     refined = refine(params, method, regions, evaluate)
     explored.followed_by(refined).save(layout.evaluations(pair))
-    save_confidence(layout.confidence(pair), pair.band, law_entries(episode_of(pair), law))
+    save_confidence(layout.confidence(pair), pair.band, law_entries(episode, law))
 
 
 if __name__ == "__main__":

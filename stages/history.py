@@ -11,16 +11,18 @@ runs.
 from __future__ import annotations
 
 from pipeline.layout import Layout
-from pipeline.session import logging_evaluator
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.identification.objective.session import logging_evaluator
 from sling2sim2real.identification.search import explore, rollouts_of
 from stages.start import pair_of_stage, run
 
 
 def main() -> None:
     params, pair = pair_of_stage()
-    rollouts = rollouts_of(params, pair.method)
-    evaluate = logging_evaluator("history", pair, params, rollouts)
-    explore(params, pair.method, evaluate).save(Layout().history(pair))
+    layout, rollouts = Layout(), rollouts_of(params, pair.method)
+    recorded = pair.band, pair.method, Episode.load(layout.episode(pair)), layout.clamps(pair)
+    evaluate = logging_evaluator(f"history-{pair.key}", params, *recorded, rollouts)
+    explore(params, pair.method, evaluate).save(layout.history(pair))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,6 @@ from sling2sim2real.identification.results.mounting import sling_of_method
 from sling2sim2real.launching.launches_file import FIT, read_launches
 from sling2sim2real.settings import Params
 from sling2sim2real.settings.identification import parameter_names
-from sling2sim2real.settings.provenance import evidence_settings_of
 from sling2sim2real.simulator.model import LaunchSetup
 from stages.start import pair_of_stage, run
 
@@ -50,9 +49,8 @@ def main() -> None:
     )
     mode = evaluated_mode(params, method, sling, episodes[0], density)
     explored.followed_by(mode).save(layout.evaluations(pair))
-    entries, samples = entries_of(density, explored), density.parameters
-    entries["made_with"] = evidence.made_with if evidence else {}
-    save_confidence(layout.confidence(pair), pair.band, entries, samples)
+    entries = entries_of(density, explored)
+    save_confidence(layout.confidence(pair), pair.band, entries, density.parameters)
 
 
 def evidence_of(path: Path, params: Params) -> Evidence | None:
@@ -67,7 +65,7 @@ def evidence_of(path: Path, params: Params) -> Evidence | None:
         if row.use == FIT and row.landing is not None
     ]
     setup = LaunchSetup.of(params.setup, params.sling)
-    return Evidence(observed, setup, evidence_settings_of(params)) if observed else None
+    return Evidence(observed, setup) if observed else None
 
 
 if __name__ == "__main__":

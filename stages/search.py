@@ -1,4 +1,4 @@
-"""Search the box of parameters with one optimiser, to the end.
+"""Search the box of parameters by one search alone, to the end.
 
     python -m stages.search band1-real2sim2real
 
@@ -10,7 +10,8 @@ begins anew. SLING_DEVICE and SLING_WORKERS say where it runs.
 from __future__ import annotations
 
 from pipeline.layout import Layout
-from pipeline.session import episode_of, logging_evaluator
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.identification.objective.session import logging_evaluator
 from sling2sim2real.identification.results.confidence_file import law_entries, save_confidence
 from sling2sim2real.identification.search import explore, rollouts_of
 from stages.start import pair_of_stage, run
@@ -19,9 +20,11 @@ from stages.start import pair_of_stage, run
 def main() -> None:
     params, pair = pair_of_stage()
     layout, rollouts = Layout(), rollouts_of(params, pair.method)
-    evaluate = logging_evaluator("search", pair, params, rollouts)
+    episode = Episode.load(layout.episode(pair))
+    recorded = pair.band, pair.method, episode, layout.clamps(pair)
+    evaluate = logging_evaluator(f"search-{pair.key}", params, *recorded, rollouts)
     explore(params, pair.method, evaluate).save(layout.evaluations(pair))
-    entries = law_entries(episode_of(pair), params.methods[pair.method].law)
+    entries = law_entries(episode, params.methods[pair.method].law)
     save_confidence(layout.confidence(pair), pair.band, entries)
 
 

@@ -15,7 +15,6 @@ from sling2sim2real.base.layout import made
 from sling2sim2real.identification.evaluations import Evaluations, theta_content
 from sling2sim2real.identification.results.confidence_file import load_confidence
 from sling2sim2real.settings.identification import parameter_names
-from sling2sim2real.settings.provenance import settings_of
 from stages.start import pair_of_stage, run
 
 
@@ -29,7 +28,6 @@ def main() -> None:
     if not method_params.mounting:  # the clamps were left as `setup` says
         entries["mounted"] = False
     content = theta_content(evaluations, band, entries)
-    content["made_with"] = settings_of(params, band, method) | entries.get("made_with", {})
     write_json(layout.theta(pair), content)
     print(f"{pair.key}: loss {content['loss']['total']:.5g}")
     intervals = (content["confidence"] or {}).get("parameters", {})

@@ -37,7 +37,7 @@ def main() -> None:
     stored = Stored(layout.policy(pair))
 
     batches = trials.scored(read_launches(layout.launches(pair.band)), pair.method)
-    if pair.of_recording in params.run.rig:
+    if band_params.source == "rig":
         targets = np.repeat(params.trials.targets, params.trials.repeats).tolist()
         aimed = trials.aimed(stored, targets)
         batches = [trials.launch_virtually(aimed, partial(_launch, pair.band)), *batches]

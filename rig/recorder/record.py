@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
-from rig.draw import sampled
+from rig.physics.draw import sampled
 from rig.physics.motion import HandMotion
 from rig.physics.robot import SENSOR_LEVER, Robot
 from rig.physics.scene import arm, joined, room, tube

@@ -171,12 +171,13 @@ class RigParams(Section):
     wrench: RigWrench
     camera: RigCamera
     draws: dict[str, Annotated[tuple[Value, Value], LIST, ASCENDING]]
+    launch_draws: dict[str, Annotated[tuple[Value, Value], LIST, ASCENDING]]
     recordings: dict[Name, RigRecording]
     bands: dict[Name, RigBand]
 
     @model_validator(mode="after")
     def _draws_are_of_keys(self) -> RigParams:
-        for key in self.draws:
+        for key in (*self.draws, *self.launch_draws):
             value: object = self
             for name in key.split("."):
                 value = getattr(value, name, None)

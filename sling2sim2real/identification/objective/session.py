@@ -40,6 +40,20 @@ class LoggingEvaluator:
         return evaluation
 
 
+def logging_evaluator(
+    title: str,
+    params: Params,
+    band: str,
+    method: str,
+    episode: Episode,
+    clamps: Path | None,
+    rollouts: int,
+) -> LoggingEvaluator:
+    """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
+    evaluate = evaluator(params, band, method, episode, clamps)
+    return LoggingEvaluator(evaluate, Progress(title, rollouts, "rollouts"))
+
+
 def evaluator(
     params: Params, band: str, method: str, episode: Episode, clamps: Path | None
 ) -> Evaluator:

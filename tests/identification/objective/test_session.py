@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sling2sim2real.base.progress import Progress, parse
-from sling2sim2real.identification.objective.session import LoggingEvaluator
+from sling2sim2real.base.progress import parse
+from sling2sim2real.identification.objective import session
 from sling2sim2real.settings import load
 from tests.identification.searches.functions import Evaluate, rosenbrock
 from tests.project import DEFAULTS
@@ -17,8 +17,9 @@ UNIT = np.random.default_rng(1).random((4, 5))
 def test_progress_says_how_far_it_is_and_the_best_so_far(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     weights = dict(PARAMS.methods["de"].weights)
-    progress = Progress("history-band1-de", 12, "rollouts")
-    evaluate = LoggingEvaluator(Evaluate(rosenbrock, weights=weights), progress)
+    monkeypatch.setattr(session, "evaluator", lambda *_: Evaluate(rosenbrock, weights=weights))
+    recorded = "band1", "de", None, None
+    evaluate = session.logging_evaluator("history-band1-de", PARAMS, *recorded, 12)
     evaluate(UNIT), evaluate(UNIT), evaluate(1 - UNIT)
     summary = [parse(line) for line in capsys.readouterr().err.splitlines()]
     least = [

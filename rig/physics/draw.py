@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from sling2sim2real.settings import Params
 
 STREAM = 7  # of the seed, apart from those of noise
-OF_LAUNCHES = ("projectile_drag",)
 
 
 def sampled(params: Params, name: str, *, launching: bool = False) -> Params:
@@ -24,10 +23,9 @@ def sampled(params: Params, name: str, *, launching: bool = False) -> Params:
         name: By which they are drawn: the band's, of a recording with its stream behind.
     """
     rig, values = params.rig, {}
-    for key, (low, high) in rig.draws.items():
-        if (key in OF_LAUNCHES) == launching:
-            rng = np.random.default_rng([rig.seed, STREAM, *name.encode(), *key.encode()])
-            values[f"rig.{key}"] = float(f"{rng.uniform(low, high):.4g}")
+    for key, (low, high) in (rig.launch_draws if launching else rig.draws).items():
+        rng = np.random.default_rng([rig.seed, STREAM, *name.encode(), *key.encode()])
+        values[f"rig.{key}"] = float(f"{rng.uniform(low, high):.4g}")
     return cast("Params", _Overlaid(params, values))
 
 

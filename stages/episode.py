@@ -16,7 +16,7 @@ from pipeline.layout import Layout
 from sling2sim2real.base.files import replacing_folder
 from sling2sim2real.base.layout import NotMade
 from sling2sim2real.recording.build import build_episodes
-from sling2sim2real.recording.input.bag import once
+from sling2sim2real.recording.files import once
 from stages.start import recording_of_stage, run
 
 

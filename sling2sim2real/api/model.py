@@ -154,12 +154,10 @@ class Theta:
     def content(self, band: str, history: LaunchHistory | None = None) -> dict:
         """What a θ file holds (`sling launch --theta`)."""
         named = {name: getattr(self, name) for name in (*THETA, *ADDED)}
-        of_law = {} if self.law == NEO_HOOKEAN else {"law": self.law}
-        if self.law == RUBBER:
-            of_law["history"] = history and vars(history)
         return {
             "band": band,
-            **of_law,
+            **({} if self.law == NEO_HOOKEAN else {"law": self.law}),
+            **({"history": history and vars(history)} if self.law == RUBBER else {}),
             "theta": {name: value for name, value in named.items() if value is not None},
             "nuisances": {"air_drag": self.air_drag},
             "turn_damping": self.turn_damping,

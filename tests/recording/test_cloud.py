@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording import cloud
+from sling2sim2real.recording import clouds as cloud
 from sling2sim2real.settings import load
 from tests.project import DEFAULTS
 from validation.recordings import looks

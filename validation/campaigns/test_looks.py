@@ -2,7 +2,7 @@
 
 import pytest
 
-from sling2sim2real.recording.cloud import clouds_of
+from sling2sim2real.recording.clouds import clouds_of
 from sling2sim2real.settings import Params
 from validation.recordings import looks
 from validation.recordings.scores import figures

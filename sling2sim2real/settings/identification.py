@@ -14,7 +14,7 @@ from sling2sim2real.settings.lab import StepParams
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound", bound=float)
 KTop = Annotated[int, Range(1, 50)]
-Law = Literal["neo_hookean", "rubber"]  # of the band's material
+Law = Literal["neo_hookean", "rubber", "corotated"]  # of the band's material
 # What each has beside the five, and how far its box may reach.
 LAWS: dict[str, dict[str, tuple[float, float]]] = {
     "neo_hookean": {},
@@ -26,6 +26,7 @@ LAWS: dict[str, dict[str, tuple[float, float]]] = {
         "flow": (0.0, 1.0),
         "log_flow_rate": (-1.0, 6.0),
     },
+    "corotated": {},
 }
 LEAST_SQUARES = "least_squares"
 UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show

@@ -180,7 +180,8 @@ def content_of(parameters: Parameters, history: LaunchHistory | None = None) -> 
     """
     values, law = parameters.sample(), parameters.law
     return {
-        **({"law": law, "history": history and vars(history)} if law == RUBBER else {}),
+        **({} if law == NEO_HOOKEAN else {"law": law}),
+        **({"history": history and vars(history)} if law == RUBBER else {}),
         "theta": {name: values[name] for name in parameter_names(law)},
         "nuisances": {"air_drag": values["air_drag"]},
         "turn_damping": values["turn_damping"],

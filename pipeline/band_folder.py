@@ -1,4 +1,4 @@
-"""A band of a run as a lab's band is kept: reports/bands/<band>/, for `sling aim` and its like.
+"""A recording of a run as a lab's band is kept: reports/bands/<recording>/, for `sling aim`.
 
 In the layout of sling2sim2real/api/band_folder.py: band.yaml, theta.json, policy.onnx, policy.json
 and card/, by the method of the cards. Its recordings and episodes stay under data/.
@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from pipeline.layout import Layout
 from sling2sim2real.api.band_folder import SIZES, BandFile, BandFolder, differences
 from sling2sim2real.api.identification import Identification, fork_of
-from sling2sim2real.api.model import Band, Theta
+from sling2sim2real.api.model import Band, Theta, with_band
 from sling2sim2real.api.settings import Settings
 from sling2sim2real.base.files import replacing_folder
-from sling2sim2real.base.layout import Layout, made
+from sling2sim2real.base.layout import made
 from sling2sim2real.base.schema import read_json
 from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.inputs import CardInputs, aims_of
@@ -30,29 +31,34 @@ from sling2sim2real.identification.results.theta import (
     load_theta,
     parameters_of,
 )
-from sling2sim2real.launching.surface.stored import BandPolicy, Stored
+from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.stretch import recorded_stretch
+from sling2sim2real.settings.run import Pair
 from sling2sim2real.simulator.model import LaunchHistory
 
+OF_A_RUN = "run", "bands", "rig", "floor"  # no settings of a lab
 
-def identified(band: str, method: str, root: str | Path = ".") -> Identification:
-    """What a method of a run found of a band.
+
+def identified(pair: Pair, root: str | Path = ".") -> Identification:
+    """What the method of a pair found of a band, by one of its recordings, whose name it bears.
 
     Raises:
-        UserError: The run has no such band or method, or has not come so far.
+        UserError: The run has not come so far.
     """
     layout, settings = Layout(Path(root)), Settings.load(Path(root, "params.yaml"))
-    sizes = settings.bands[band]
-    content = load_theta(layout.theta(band, method), band)
+    sizes = settings.bands[pair.band]
+    name = BandFolder(layout.card(pair)).name
+    band = Band(sizes.mass, sizes.diameter, sizes.rest_length, name, sizes.preconditioned)
+    content = load_theta(layout.theta(pair), pair.band)
     file = ThetaFile.model_validate(content)
-    samples = load_samples(layout.confidence(band, method), parameters_of(content))
-    episodes, path = Episode.load_all(layout.episodes(band)), layout.clamps(band)
+    samples = load_samples(layout.confidence(pair), parameters_of(content))
+    episodes, path = Episode.load_all(layout.episodes(pair)), layout.clamps(pair)
     return Identification(
-        band=Band(sizes.mass, sizes.diameter, sizes.rest_length, band, sizes.preconditioned),
+        band=band,
         theta=Theta.of_file(file),
         mounting=read_json(path, Mounting) if file.mounted and path.exists() else None,
         history=file.history and LaunchHistory(**file.history.model_dump()),
-        settings=settings,
+        settings=with_band(settings, band),
         confidence=content.get("confidence") or {},
         samples=None if samples is None else samples.values,
         stretch=recorded_stretch(episodes, settings.setup.fork_width, sizes.rest_length),
@@ -60,33 +66,34 @@ def identified(band: str, method: str, root: str | Path = ".") -> Identification
     )
 
 
-def card_inputs(band: str, method: str, root: str | Path = ".") -> CardInputs:
-    """What a band's card is made from. Raises UserError where an input is missing."""
-    layout, found = Layout(Path(root)), identified(band, method, root)
-    stored = Stored(band, method, layout.root)
+def card_inputs(pair: Pair, root: str | Path = ".") -> CardInputs:
+    """What the card of a recording is made from. Raises UserError where an input is missing."""
+    layout, found = Layout(Path(root)), identified(pair, root)
+    stored = Stored(layout.policy(pair))
     targets = np.array(found.settings.trials.targets, float)
     return CardInputs(
         found=found,
-        method=method,
-        episodes=Episode.load_all(layout.episodes(band)),
-        launched=_landed(pd.read_parquet(made(layout.trials(band, method)))),
+        method=pair.method,
+        episodes=Episode.load_all(layout.episodes(pair)),
+        launched=_landed(pd.read_parquet(made(layout.trials(pair)))),
         aims=aims_of(found, targets, stored.draws(targets)),
         trained=stored.card()["training"]["converged"],
-        virtual=found.settings.bands[band].source == "rig",
+        virtual=found.settings.bands[pair.band].source == "rig",
     )
 
 
-def write(band: str, method: str, root: str | Path = ".") -> dict:
-    """Write a band's folder; return what its card.json says. Raises UserError."""
-    layout, inputs = Layout(Path(root)), card_inputs(band, method, root)
+def write(pair: Pair, root: str | Path = ".") -> dict:
+    """Write a recording's folder; return what its card.json says. Raises UserError."""
+    layout, inputs = Layout(Path(root)), card_inputs(pair, root)
     found, episode = inputs.found, inputs.episode
-    stored = Stored(band, method, layout.root)
-    recording = layout.raw(band) / episode.metadata["input"]["file"]
+    recording = layout.raw(pair) / episode.metadata["input"]["file"]
     pictures = Pictures.of(recording, episode, found.settings.setup)
-    with replacing_folder(layout.card(band)) as temporary:
-        folder, policy = BandFolder(temporary), BandPolicy(temporary)
+    with replacing_folder(layout.card(pair)) as temporary:
+        folder = BandFolder(temporary)
+        stored, policy = Stored(layout.policy(pair)), Stored.of_band(temporary)
         sizes = {name: getattr(found.band, name) for name in SIZES}
         other = differences(found.settings, Settings.default())
+        other = {name: values for name, values in other.items() if name not in OF_A_RUN}
         BandFile(sizes, found.band.preconditioned, (), other).save(folder.band_file)
         found.save(folder.theta)
         shutil.copyfile(stored.network, policy.network)

@@ -142,7 +142,8 @@ class BandFolder:
 
     @property
     def name(self) -> str:
-        return self.path.resolve().name
+        """Of the band, a word: `band1_dips` of reports/bands/band1-dips."""
+        return self.path.resolve().name.replace("-", "_")
 
     @property
     def band_file(self) -> Path:

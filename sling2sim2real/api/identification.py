@@ -20,11 +20,11 @@ from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.mounting import Mounting
 from sling2sim2real.identification.results.theta import ThetaFile
 from sling2sim2real.identification.results.units import SI_UNITS
-from sling2sim2real.launching.surface.stored import BandPolicy, PolicyFiles
+from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.simulator.model import LaunchHistory
 from sling2sim2real.simulator.parameters import Parameters
 
-METHOD = "least_squares"
+METHOD = "posterior"
 
 
 class Fork(JsonRecord):
@@ -86,7 +86,7 @@ class Identification(Model):
     samples: np.ndarray | None = field(default=None, repr=False, compare=False)
     stretch: float | None = None
     fork: Fork | None = field(default=None, repr=False)
-    policy: PolicyFiles | None = field(default=None, repr=False, compare=False)
+    policy: Stored | None = field(default=None, repr=False, compare=False)
     stale: bool = field(default=False, repr=False, compare=False)
 
     @cached_property
@@ -166,7 +166,7 @@ class Identification(Model):
             ) from error
         if folder is None:
             return found
-        policy = BandPolicy(folder.path)
+        policy = Stored.of_band(folder.path)
         return replace(
             found,
             policy=policy if policy.network.is_file() else None,

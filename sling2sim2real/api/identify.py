@@ -39,7 +39,7 @@ def identify(
     start: Model | None = None,
     progress: Callable[[str], None] = lambda line: None,
 ) -> Identification:
-    """Identify a band as the method `least_squares` of a run does; half a minute a recording.
+    """Identify a band as the method `posterior` of a run does; half a minute a recording.
 
     Three steps: how the band hangs, from the first episode before it is taut; the best of a design
     over the whole box of parameters; from there the mode of one density over all episodes and
@@ -129,7 +129,7 @@ def starting_model(
     explored = explore(settings, METHOD, evaluate)
     progress(f"explored {len(explored.total)} points")
     best = explored.best_parameters(settings.methods[METHOD].law)
-    return Model(band, Theta.of(best.names, best.values[0]), mounting, settings=settings)
+    return Model(band, Theta.of(best.names, best.values[0], best.law), mounting, settings=settings)
 
 
 def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> ClampedBand:

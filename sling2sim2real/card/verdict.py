@@ -210,7 +210,7 @@ def _identified(findings: Findings):
         yield Reason(
             False,
             "This method does not tell how sure its values are.",
-            "Take the method `least_squares`: it tells.",
+            "Take the method `posterior`: it tells.",
         )
     elif not findings.settled:
         yield Reason(

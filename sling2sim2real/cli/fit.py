@@ -34,7 +34,7 @@ from sling2sim2real.cli.steps import Steps
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.posterior.launches import Observed
 from sling2sim2real.identification.results.mounting import Mounting
-from sling2sim2real.launching.surface.stored import BandPolicy
+from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.recording import files as bag
 from sling2sim2real.recording.mask_folder import MASK_NAME, masks_beside
 
@@ -77,7 +77,7 @@ def fit(
     recordings = bag.once(recordings)
     file = _file(folder, recordings, sizes or {})
     settings = folder.settings_with(file)
-    policy = policy or BandPolicy(folder.path).network.is_file()
+    policy = policy or Stored.of_band(folder.path).network.is_file()
     steps = Steps({name: cost for name, cost in COSTS.items() if policy or name != POLICY})
     if not folder.lab_file.is_file():
         steps.say(f"no {folder.lab_file}: the usual settings hold (`sling setup` writes yours)", 0)
@@ -306,7 +306,7 @@ def _with_policy(folder: BandFolder, found: Identification, steps: Steps) -> Ide
     """The band with a policy of its θ, trained where that is not there."""
     from sling2sim2real.settings.provenance import policy_settings_of
 
-    stored, settings, name = BandPolicy(folder.path), found.settings, folder.name
+    stored, settings, name = Stored.of_band(folder.path), found.settings, folder.name
     content = found.content()
     try:
         card = stored.card()
@@ -370,7 +370,7 @@ def _card(folder: BandFolder, found: Identification, episodes: Sequence[Episode]
     try:
         card = read_json(folder.card / "card.json", JsonRecord).model_dump()
         with_policy = (folder.card / "card.json").stat().st_mtime_ns
-        network = BandPolicy(folder.path).network
+        network = Stored.of_band(folder.path).network
         newer = network.is_file() and network.stat().st_mtime_ns > with_policy
         if card.pop("digest", None) == folder.digest and not newer:
             return card

@@ -8,7 +8,7 @@ import pytest
 
 from sling2sim2real import Identification, LaunchHistory, Settings, Theta, aim, launch
 from sling2sim2real.base.errors import Refused, UserError
-from sling2sim2real.launching.surface.stored import BandPolicy
+from sling2sim2real.launching.surface.stored import Stored
 from tests.policy.linear import write_policy
 
 
@@ -86,7 +86,7 @@ def test_a_launch_that_fails_says_why(world) -> None:
 
 def test_the_policy_in_a_bands_folder_is_asked(world, tmp_path) -> None:
     """One that draws along a line, whatever else lands there."""
-    policy = BandPolicy(tmp_path)
+    policy = Stored.of_band(tmp_path)
     write_policy(policy.network, (-0.05, 0.0), (-0.2, -0.15))
     put_card(policy.card_file, world.theta.content("toy")["theta"])
     arguments = {name: getattr(world, name) for name in ("band", "theta", "settings")}

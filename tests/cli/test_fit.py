@@ -11,13 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.layout import Layout
 from sling2sim2real import Identification, UserError
 from sling2sim2real.api.band_folder import BandFile, BandFolder
-from sling2sim2real.base.layout import Layout
+from sling2sim2real.base.launches_file import write_launches
 from sling2sim2real.cli import fit as module
 from sling2sim2real.cli.fit import fit, folder_of, shown
 from sling2sim2real.identification.results.theta import load_theta
 from sling2sim2real.recording import build
+from sling2sim2real.settings.run import Pair
 from tests.cli.lab import LAB, MASS, NAME, furnish
 from tests.project import contents, write_params_of
 
@@ -104,22 +106,23 @@ def test_what_a_band_changes_of_the_lab_holds_for_it(copied) -> None:
 def test_theta_is_that_of_the_experiment(fitted, tmp_path, monkeypatch) -> None:
     """To the digit: the stages of a run, on the same recording with the same settings."""
     write_params_of(tmp_path, NAME, METHOD, MASS, **LAB)
-    layout = Layout(tmp_path)
-    layout.raw(NAME).mkdir(parents=True)
-    shutil.copy(fitted / "seen.mcap", layout.raw(NAME))
+    layout, pair = Layout(tmp_path), Pair(band=NAME, recording="plain", method=METHOD)
+    layout.raw(pair).mkdir(parents=True)
+    shutil.copy(fitted / "seen.mcap", layout.raw(pair))
+    write_launches(layout.launches(NAME), [])
     monkeypatch.chdir(tmp_path)
-    for stage in ("episode", "clamps", "history", "evidence", "density", "theta"):
-        arguments = [NAME] if stage in ("episode", "clamps", "evidence") else [NAME, METHOD]
-        monkeypatch.setattr(sys, "argv", ["stage", *arguments])
+    for stage in ("episode", "clamps", "history", "posterior", "theta"):
+        key = pair.of_recording if stage in ("episode", "clamps") else pair.key
+        monkeypatch.setattr(sys, "argv", ["stage", key])
         with pytest.raises(SystemExit) as ended:
             runpy.run_module(f"stages.{stage}", run_name="__main__")
         assert not ended.value.code
     found = Identification.load(fitted / TOY)
-    content = load_theta(layout.theta(NAME, METHOD), NAME)
+    content = load_theta(layout.theta(pair), NAME)
     mine = found.content()
     assert mine["theta"] == content["theta"]
     assert mine["confidence"] == content["confidence"]
-    samples = json.loads(layout.confidence(NAME, METHOD).read_text())["samples"]
+    samples = json.loads(layout.confidence(pair).read_text())["samples"]
     assert found.samples.tolist() == samples
 
 

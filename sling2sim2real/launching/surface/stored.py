@@ -1,15 +1,14 @@
-"""A trained policy on the disk: where it lies, and what it says."""
+"""A policy in its folder, and what it says."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
-from sling2sim2real.base.layout import Layout, NotMade, made
+from sling2sim2real.base.layout import NotMade, made
 from sling2sim2real.base.schema import LIST, JsonRecord, read_json
 
 
@@ -50,18 +49,31 @@ class Card(JsonRecord):
     projectile: Projectile | None = None  # of a policy that sees it
 
 
-class PolicyFiles(ABC):
-    """A trained policy by its files."""
+@dataclass(frozen=True)
+class Stored:
+    """A policy.
+
+    Attributes:
+        folder: Where its files lie, or would.
+        card_name: Of the file beside the network that says what it is (policy/export.py).
+    """
+
+    folder: Path
+    card_name: str = "card.json"
+
+    @classmethod
+    def of_band(cls, folder: Path) -> Stored:
+        """That in a band's folder (api/band_folder.py)."""
+        return cls(folder, "policy.json")
 
     @property
-    @abstractmethod
     def network(self) -> Path:
         """policy.onnx, metres to metres."""
+        return self.folder / "policy.onnx"
 
     @property
-    @abstractmethod
     def card_file(self) -> Path:
-        """What it is, and how its training went (policy/export.py)."""
+        return self.folder / self.card_name
 
     def card(self) -> dict:
         """What its card says (export.card). Raises NotMade: missing, or damaged."""
@@ -99,44 +111,3 @@ class PolicyFiles(ABC):
         if projectile is None:
             raise NotMade(self.card_file, "lacks the policy's input `projectile`")
         return projectile["trained_at"]
-
-
-@dataclass(frozen=True)
-class Stored(PolicyFiles):
-    """The policy of `method` for `band`, of a run.
-
-    Attributes:
-        root: Of the project.
-    """
-
-    band: str
-    method: str
-    root: Path = Path()
-
-    @property
-    def folder(self) -> Path:
-        """Where its files lie, or would."""
-        return Layout(self.root).policy(self.band, self.method)
-
-    @property
-    def network(self) -> Path:
-        return self.folder / "policy.onnx"
-
-    @property
-    def card_file(self) -> Path:
-        return self.folder / "card.json"
-
-
-@dataclass(frozen=True)
-class BandPolicy(PolicyFiles):
-    """The policy in a band's folder (api/band_folder.py)."""
-
-    folder: Path
-
-    @property
-    def network(self) -> Path:
-        return self.folder / "policy.onnx"
-
-    @property
-    def card_file(self) -> Path:
-        return self.folder / "policy.json"

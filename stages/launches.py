@@ -12,11 +12,11 @@ from functools import partial
 
 import numpy as np
 
+from pipeline.params import load
 from rig.physics.launch import Trial, launch
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials import trials
-from sling2sim2real.settings import load
 from stages.start import run, started
 
 

@@ -10,10 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 from threading import Thread
 
+from pipeline.params import Params, load
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.layout import Layout, NotMade, owner
-from sling2sim2real.settings import Params, expect_known, load
+from sling2sim2real.settings import expect_known
 from sling2sim2real.settings.identification import steps_of
 
 MAKERS = {  # steps that make a folder of another name

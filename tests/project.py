@@ -9,9 +9,9 @@ from typing import Any
 import psutil
 from ruamel.yaml import YAML
 
+from pipeline.params.run import StepParams
 from sling2sim2real.base.code import ROOT
 from sling2sim2real.settings.identification import steps_of
-from sling2sim2real.settings.lab import StepParams
 from validation.projects import DEFAULTS, environment, wait
 
 # What params.yaml has of a band of one's own.

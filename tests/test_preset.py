@@ -11,8 +11,8 @@ import psutil
 import pytest
 from ruamel.yaml import YAML
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS, ROOT, until
 from tools.preset import PRESETS, preset, store_report, write_preset
 

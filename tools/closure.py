@@ -3,9 +3,9 @@
 DVC re-runs a stage when something listed changes; it cannot see Python's imports. This follows what
 a stage's script imports, at any depth and inside functions too, and lists the folder of each such
 file: one folder a concern. Two things are nobody's dependency, for no result depends on them but
-by the values in params.yaml, which DVC tracks by themselves: sling2sim2real/settings/, with no
-default, and stages/start.py, which reads the arguments. Optimisers are found by name, so that no
-import says which of them a stage runs: their folders are listed by hand.
+by the values in params.yaml, which DVC tracks by themselves: the models of its keys, each of
+which stands there, and stages/start.py, which reads the arguments. Optimisers are found by name,
+so that no import says which of them a stage runs: their folders are listed by hand.
 
     python tools/closure.py          # says what differs; exit status 1 if anything does
     python tools/closure.py --fix    # rewrite the code dependencies, comments kept

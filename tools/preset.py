@@ -25,12 +25,12 @@ from ruamel.yaml import YAML
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
+from pipeline.params import parse  # noqa: E402
 from pipeline.report.run import write_run  # noqa: E402
 from sling2sim2real.base import errors  # noqa: E402
 from sling2sim2real.base.errors import UserError  # noqa: E402
 from sling2sim2real.base.files import replacing_folder, write_text  # noqa: E402
 from sling2sim2real.cli.params_file import edited  # noqa: E402
-from sling2sim2real.settings import parse  # noqa: E402
 
 PRESETS = ROOT / "presets"
 PAGES, PARTS = ("README.md", "appendix.md"), ("figures", "tables", "run.js")

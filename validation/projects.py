@@ -17,9 +17,9 @@ from typing import TypeVar
 import psutil
 from ruamel.yaml import YAML
 
+from pipeline.params import Params, load
+from pipeline.params.run import methods_by_step
 from sling2sim2real.base.code import ROOT
-from sling2sim2real.settings import Params, load
-from sling2sim2real.settings.identification import methods_by_step
 
 DEFAULTS = ROOT / "params.yaml"
 CLI = (

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from pipeline.params import Params
 from sling2sim2real.base.layout import Layout, NotMade, made
 from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.episode.episode import Episode
@@ -17,7 +18,6 @@ from sling2sim2real.identification.search.regions import Region, load_regions
 from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.measured import load_scores
-from sling2sim2real.settings import Params
 
 PRINTED = ("geom", "force", "work")  # the paper's loss is their sum (docs/method.md)
 

@@ -25,8 +25,8 @@ from rig.recorder.sensors import wrench
 from sling2sim2real.base.files import replacing
 
 if TYPE_CHECKING:
-    from sling2sim2real.settings import Params
-    from sling2sim2real.settings.virtual_rig import RigClock
+    from pipeline.params import Params
+    from pipeline.params.virtual_rig import RigClock
 
 EPOCH = 1_760_000_000_000_000_000  # ns, when the recording starts
 SENSOR_RATE, GRIPPER_RATE = 1000, 50  # Hz

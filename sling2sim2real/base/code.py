@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[2]
 CODE = ("pipeline/", "rig/", "stages/", "sling2sim2real/", "validation/")
 UNTRACKED = (
     "sling2sim2real/settings/",
+    "pipeline/params/",
     "stages/start.py",
 )  # nobody's dependency: see tools/closure.py
 NESTED = (  # folders of folders: what lies in them is a concern by itself, be it folder or file

@@ -11,7 +11,7 @@ from sling2sim2real.base.layout import Layout, NotMade
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.posterior.likelihood import opening_time
 from sling2sim2real.identification.results.theta import calibrated, parameters_of
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.replay import replay
 
 COARSE, FINE = 1 / 30, 1e-3  # s between states, around the release FINE
@@ -57,7 +57,7 @@ def smooth(place: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     return Akima1DInterpolator(place, nodes, axis=0, method="makima")(along)
 
 
-def simulate(params: Params, band: str, method: str, episode: Episode, theta: dict) -> Simulated:
+def simulate(params: Settings, band: str, method: str, episode: Episode, theta: dict) -> Simulated:
     """Play the pull with a θ file's content, its release and its camera's clock as identified.
 
     Raises:

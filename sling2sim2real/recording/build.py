@@ -15,7 +15,7 @@ from sling2sim2real.recording.geometry import EpisodeGeometry
 from sling2sim2real.recording.input.reader import explained, read_recording
 from sling2sim2real.recording.processed import Processed
 from sling2sim2real.recording.pulls import Pull, pulls_of
-from sling2sim2real.settings import Params, expect_known
+from sling2sim2real.settings import Settings, expect_known
 from sling2sim2real.settings.lab import BandParams
 
 
@@ -38,13 +38,13 @@ class Checked(Processed):
         return next((finding for finding in self.findings if finding.refused), None)
 
 
-def process(path: Path, band: BandParams, params: Params) -> Checked:
+def process(path: Path, band: BandParams, params: Settings) -> Checked:
     """Return the first of a recording's pulls that can be used. Raises UserError."""
     return process_pulls(path, band, params)[0][0]
 
 
 def process_pulls(
-    path: Path, band: BandParams, params: Params
+    path: Path, band: BandParams, params: Settings
 ) -> tuple[list[Checked], list[UserError]]:
     """Read, then for each pull resolve frames, set stamps right, find events, mask.
 
@@ -72,7 +72,7 @@ def process_pulls(
     return usable, refused
 
 
-def process_pull(pull: Pull, band: BandParams, params: Params) -> Checked:
+def process_pull(pull: Pull, band: BandParams, params: Settings) -> Checked:
     """Process one pull: correct its delays, then run all checks, which ask for signals and clouds.
 
     Raises UserError where it cannot be used.
@@ -84,7 +84,7 @@ def process_pull(pull: Pull, band: BandParams, params: Params) -> Checked:
 
 
 def build_episodes(
-    path: Path, band_name: str, params: Params
+    path: Path, band_name: str, params: Settings
 ) -> tuple[list[Episode], list[UserError]]:
     """The episodes of a recording's pulls, and why others have none; see `process_pulls`."""
     expect_known(params, "band", band_name)
@@ -92,7 +92,7 @@ def build_episodes(
     return [episode_of(done, band_name, params) for done in usable], refused
 
 
-def episode_of(done: Checked, band_name: str, params: Params) -> Episode:
+def episode_of(done: Checked, band_name: str, params: Settings) -> Episode:
     """The episode, with everything in its metadata that was chosen on the way."""
     signals, clouds = done.signals, done.clouds
     recording, geometry = done.pull.recording, done.pull.geometry

@@ -15,7 +15,7 @@ from sling2sim2real.recording.pulls import Pull
 from sling2sim2real.recording.signals import Signals, signals_of
 from sling2sim2real.recording.tips import Tips, measure_tips
 from sling2sim2real.recording.view import Scene, View
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import BandParams
 
 
@@ -33,11 +33,11 @@ class Processed:
     pull: Pull
     delays: Delays
     band: BandParams
-    params: Params
+    params: Settings
     weighed: bool = True
 
     @classmethod
-    def of(cls, pull: Pull, band: BandParams, params: Params, weighed: bool = True) -> Self:
+    def of(cls, pull: Pull, band: BandParams, params: Settings, weighed: bool = True) -> Self:
         """Correct the delays of its streams. Raises UserError."""
         return cls(*correct_delays(pull, params), band, params, weighed)
 

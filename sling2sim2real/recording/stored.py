@@ -17,14 +17,14 @@ from sling2sim2real.base.fingerprint import fingerprint
 from sling2sim2real.base.layout import Layout, NotMade
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.recording.input.bag import sha256
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 PIPELINE = Path(__file__).parents[1]
 SOURCES = [PIPELINE / name for name in ("base", "episode", "recording")]
 PACKAGES = "numpy", "scipy", "open3d", "opencv-python-headless", "pillow", "rosbags"
 
 
-def keep(path: Path, episodes: Sequence[Episode], params: Params, layout: Layout) -> None:
+def keep(path: Path, episodes: Sequence[Episode], params: Settings, layout: Layout) -> None:
     """Keep what `build_episodes` would make of a recording."""
     if _keeps(path, params):
         with replacing_folder(_folder(path, episodes[0].band, params, layout)) as folder:
@@ -33,7 +33,7 @@ def keep(path: Path, episodes: Sequence[Episode], params: Params, layout: Layout
 
 
 def load_or_build(
-    path: Path, band: str, params: Params, layout: Layout
+    path: Path, band: str, params: Settings, layout: Layout
 ) -> tuple[list[Episode], list[UserError]]:
     """Return what `build_episodes` would, from what is stored where it still holds."""
     if _keeps(path, params):
@@ -51,7 +51,7 @@ def forget(band: str, layout: Layout) -> None:
     shutil.rmtree(_of_band(band, layout), ignore_errors=True)
 
 
-def _keeps(path: Path, params: Params) -> bool:
+def _keeps(path: Path, params: Settings) -> bool:
     """Masks in files or of a model, and the parts of a bag, are no part of the key."""
     return params.cloud.mask == "opencv" and path.is_file()
 
@@ -60,7 +60,7 @@ def _of_band(band: str, layout: Layout) -> Path:
     return layout.root / ".checkpoints" / f"{band}-episodes"
 
 
-def _folder(path: Path, band: str, params: Params, layout: Layout) -> Path:
+def _folder(path: Path, band: str, params: Settings, layout: Layout) -> Path:
     sections = params.bands[band], params.setup, params.episode, params.cloud, params.force
     key = fingerprint(
         path.name,

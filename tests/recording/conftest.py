@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from pipeline.params import Params, load
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.recording.build import Checked, episode_of, process
 from sling2sim2real.recording.masks.ridge import RidgeMask
-from sling2sim2real.settings import Params, load
 from tests import once
 from tests.project import DEFAULTS, with_
 from validation.recordings.bag import Truth, write_bag

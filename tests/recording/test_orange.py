@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.params import BandParams, load
 from sling2sim2real.recording.build import episode_of, process
-from sling2sim2real.settings import BandParams, load
 from tests.project import DEFAULTS, ROOT
 
 FOLDER = ROOT.parent / "shared/recordings"

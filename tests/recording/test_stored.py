@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.params import Params
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.recording import stored
 from sling2sim2real.recording.build import build_episodes
-from sling2sim2real.settings import Params
 from tests.project import contents, with_
 
 

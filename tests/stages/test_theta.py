@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+from pipeline.params import load
 from sling2sim2real.api.identification import Identification
 from sling2sim2real.base.files import write_json
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.identification.results.theta import calibrated, load_theta
-from sling2sim2real.settings import load
 from sling2sim2real.simulator.parameters import Parameters
 from tests.project import DEFAULTS
 from validation.synthetic import own_law_episode, recorded_yardstick

@@ -26,7 +26,7 @@ from sling2sim2real.recording.input.bag import sha256
 from sling2sim2real.recording.input.container import Container, read_container
 from sling2sim2real.recording.input.reader import Recording, recording_of
 from sling2sim2real.recording.pulls import Pull, pulls_of
-from sling2sim2real.settings import Params, expect_known
+from sling2sim2real.settings import Settings, expect_known
 from sling2sim2real.settings.lab import BandParams
 
 
@@ -63,7 +63,7 @@ class GivenBand:
 
 def look_at(
     path: Path,
-    params: Params,
+    params: Settings,
     band: GivenBand,
     pull: int | None = None,
 ) -> Look:
@@ -108,7 +108,7 @@ def look_at(
 
 
 def band_of(
-    params: Params,
+    params: Settings,
     name: str | None = None,
     mass: float | None = None,
     diameter: float | None = None,

@@ -15,7 +15,7 @@ from sling2sim2real.identification.objective.engine import simulate_of
 from sling2sim2real.identification.objective.evaluate import Evaluation, Evaluator
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.identification.results.mounting import sling_of_method
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import OUR_ENGINE
 
 
@@ -41,14 +41,14 @@ class LoggingEvaluator:
 
 
 def logging_evaluator(
-    stage: str, band: str, method: str, params: Params, rollouts: int
+    stage: str, band: str, method: str, params: Settings, rollouts: int
 ) -> LoggingEvaluator:
     """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
     progress = Progress(f"{stage}-{band}-{method}", rollouts, "rollouts")
     return LoggingEvaluator(evaluator(params, band, method), progress)
 
 
-def evaluator(params: Params, band: str, method: str) -> Evaluator:
+def evaluator(params: Settings, band: str, method: str) -> Evaluator:
     """The evaluator of a recorded band, on the devices that the environment names."""
     episode, engine = load_episode(band), params.methods[method].engine
     sling = sling_of_method(params, band, method)

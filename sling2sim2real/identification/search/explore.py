@@ -11,11 +11,11 @@ from sling2sim2real.identification.objective.evaluate import Evaluation
 from sling2sim2real.identification.search.build import explorer
 from sling2sim2real.identification.search.evaluations import Evaluations
 from sling2sim2real.identification.search.loop import search
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import LEAST_SQUARES
 
 
-def rollouts_of(params: Params, method: str) -> int:
+def rollouts_of(params: Settings, method: str) -> int:
     """How many points a method explores.
 
     A search of one phase has the rollouts of a refinement too: all methods spend the same.
@@ -28,7 +28,7 @@ def rollouts_of(params: Params, method: str) -> int:
 
 
 def explore(
-    params: Params, method: str, evaluate: Callable[[np.ndarray], Evaluation]
+    params: Settings, method: str, evaluate: Callable[[np.ndarray], Evaluation]
 ) -> Evaluations:
     """Everything that the exploration of a method evaluates, in order.
 

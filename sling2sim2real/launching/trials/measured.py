@@ -14,7 +14,7 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_json
 from sling2sim2real.base.schema import LIST, JsonRecord, read_json
 from sling2sim2real.base.target import TARGET_AREA
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 
 class Measured(JsonRecord):
@@ -33,7 +33,7 @@ class Measured(JsonRecord):
     method: str = ""
 
 
-def read_scores(folder: Path, band: str, params: Params) -> list[Measured]:
+def read_scores(folder: Path, band: str, params: Settings) -> list[Measured]:
     """A band's measured launches, from its CSV in `folder`; none where it has no file.
 
     Raises:

@@ -11,13 +11,14 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
+from pipeline.params import Params, load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.plan import limits
 from sling2sim2real.cli.plan.force import Earlier, Held, predict
 from sling2sim2real.cli.plan.messages import COLUMNS
 from sling2sim2real.cli.plan.plan import plan_recording, with_band
 from sling2sim2real.cli.plan.trajectory import Phase, Trajectory
-from sling2sim2real.settings import Params, load, parse
+from sling2sim2real.settings import parse
 from sling2sim2real.settings.lab import Dip, Gripper
 from tests.project import DEFAULTS, with_
 

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from pipeline.params import Params
 from sling2sim2real.cli.preflight.check import Look, band_of, look_at
 from sling2sim2real.recording.build import Checked
 from sling2sim2real.recording.pulls import Pull
-from sling2sim2real.settings import Params
 from sling2sim2real.settings.lab import BandParams
 from tests.project import DEFAULTS
 from tests.recording.conftest import blind, masked, params, seen

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.params import load
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.base.progress import parse
 from sling2sim2real.identification.objective import session
-from sling2sim2real.settings import load
 from tests.identification.search import toy
 from tests.identification.search.functions import Evaluate, rosenbrock
 from tests.project import DEFAULTS

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.params import Params
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.identification.optimizers.de.evolution import Evolution
 from sling2sim2real.identification.search.build import build, explorer
 from sling2sim2real.identification.search.loop import latin_hypercube
-from sling2sim2real.settings import parse
 from tests.identification.search.functions import Evaluate, alone, rosenbrock
 from tests.project import DEFAULTS
 
@@ -20,7 +20,7 @@ OWN = "tests.identification.search.own:RandomSearch"
 
 def method(**more):
     """params.yaml's optimiser, and its method sling2sim2real with other keys."""
-    params = parse(TEXT)
+    params = Params.parse(TEXT)
     method_params = params.methods["sling2sim2real"].model_copy(update=more)
     return method_params, params.optimizer
 

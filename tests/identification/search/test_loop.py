@@ -8,13 +8,13 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.search.build import build
 from sling2sim2real.identification.search.evaluations import Evaluations, theta_content
 from sling2sim2real.identification.search.explore import rollouts_of
 from sling2sim2real.identification.search.loop import latin_hypercube, search
-from sling2sim2real.settings import load
 from tests.identification.search import functions
 from tests.identification.search.functions import (
     CENTRE,

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 from ruamel.yaml import YAML
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.settings import load
 from tests.report.conftest import BAND, METHOD
 from tests.report.conftest import root as root  # noqa: PLC0414
 from tests.report.conftest import template as template  # noqa: PLC0414

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording.cloud import clouds_of
 from sling2sim2real.recording.input.frames import Transform
 from sling2sim2real.recording.masks.hand import Colors, Shape
 from sling2sim2real.recording.masks.ridge import RidgeMask
 from sling2sim2real.recording.view import View
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS
 from validation.recordings import looks, strand
 from validation.recordings.looks import LOOKS

@@ -12,11 +12,11 @@ from sling2sim2real.identification.optimizers.cma.multistart import Multistart
 from sling2sim2real.identification.search.evaluations import Evaluations
 from sling2sim2real.identification.search.loop import search
 from sling2sim2real.identification.search.regions import Region
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 
 def refine(
-    params: Params,
+    params: Settings,
     method: str,
     regions: Sequence[Region],
     evaluate: Callable[[np.ndarray], Evaluation],

@@ -9,8 +9,8 @@ start in each region.
 from __future__ import annotations
 
 from sling2sim2real.base.layout import Layout, made
-from sling2sim2real.identification.search.evaluations import Evaluations
-from sling2sim2real.identification.search.regions import regions_of, save_regions
+from sling2sim2real.identification.evaluations import Evaluations
+from sling2sim2real.identification.searches.regions import regions_of, save_regions
 from sling2sim2real.settings.identification import parameter_names
 from stages.start import run, started
 

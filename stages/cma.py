@@ -11,11 +11,11 @@ samples. Killed, it begins anew. SLING_DEVICE and SLING_WORKERS say where it run
 from __future__ import annotations
 
 from sling2sim2real.base.layout import Layout, made
+from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.objective.session import load_episode, logging_evaluator
-from sling2sim2real.identification.optimizers.cma.refine import refine
 from sling2sim2real.identification.results.confidence_file import law_entries, save_confidence
-from sling2sim2real.identification.search.evaluations import Evaluations
-from sling2sim2real.identification.search.regions import load_regions
+from sling2sim2real.identification.searches.cma_es import refine
+from sling2sim2real.identification.searches.regions import load_regions
 from sling2sim2real.settings.identification import parameter_names
 from stages.start import run, started
 

@@ -13,12 +13,12 @@ from __future__ import annotations
 from sling2sim2real.base.layout import Layout, made
 from sling2sim2real.base.machine import workers
 from sling2sim2real.identification.density import entries_of, evaluated_mode
+from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.objective.session import load_episodes
 from sling2sim2real.identification.posterior.evidence import load_observed
 from sling2sim2real.identification.posterior.identify import fit_posterior
 from sling2sim2real.identification.results.confidence_file import save_confidence
 from sling2sim2real.identification.results.mounting import sling_of_method
-from sling2sim2real.identification.search.evaluations import Evaluations
 from sling2sim2real.settings.identification import parameter_names
 from stages.start import run, started
 

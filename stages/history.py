@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.identification.objective.session import logging_evaluator
-from sling2sim2real.identification.search.explore import explore, rollouts_of
+from sling2sim2real.identification.search import explore, rollouts_of
 from stages.start import run, started
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.identification.objective.session import load_episode, logging_evaluator
 from sling2sim2real.identification.results.confidence_file import law_entries, save_confidence
-from sling2sim2real.identification.search.explore import explore, rollouts_of
+from sling2sim2real.identification.search import explore, rollouts_of
 from stages.start import run, started
 
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from sling2sim2real.base.files import write_json
 from sling2sim2real.base.layout import Layout, made
+from sling2sim2real.identification.evaluations import Evaluations, theta_content
 from sling2sim2real.identification.results.confidence_file import load_confidence
-from sling2sim2real.identification.search.evaluations import Evaluations, theta_content
 from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.settings.provenance import settings_of
 from stages.start import run, started

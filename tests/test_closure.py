@@ -22,7 +22,12 @@ MAY_SEE_THE_RIG = {
     "stages/launches.py",
     "stages/floor.py",
 }
-OPTIMIZERS = {"history": ("de", "design"), "de": ("de",), "bo": ("bo",), "adam": ("adam",)}
+SEARCHES = {
+    "history": "differential_evolution",
+    "de": "differential_evolution",
+    "bo": "bayesian",
+    "adam": "adam",
+}
 ORACLE = "rig/oracle/"
 PROOF = "validation/campaigns/"  # which holds what was identified against the truth
 MAY_ASK_THE_ORACLE = ("stages/floor.py", ORACLE, PROOF)
@@ -50,8 +55,9 @@ def relative(file: Path) -> str:
 def test_stages_list_the_folders_that_they_run() -> None:
     for name, stage in STAGES.items():
         listed = [dep for dep in stage["deps"] if dep.startswith(CODE)]
-        optimizers = {f"{BY_NAME}{kind}" for kind in OPTIMIZERS.get(ungrouped(name), ())}
-        code = sorted({*folders(script_of(stage)), *optimizers})
+        search = SEARCHES.get(ungrouped(name))
+        by_name = {f"{BY_NAME}{search}.py"} if search else set()
+        code = sorted({*folders(script_of(stage)), *by_name})
         assert listed == code, f"{name}: run `python tools/closure.py --fix`"
         assert len(listed) <= 12
 

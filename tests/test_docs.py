@@ -1,13 +1,10 @@
-"""What README and docs say is so: links, commands, stages, keys, Python, and the results on top."""
+"""What README and docs say is so: links, commands, stages, keys, Python."""
 
 import argparse
 import ast
-import csv
 import importlib.util
-import json
 import re
 import shlex
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -229,45 +226,6 @@ def imported(node: ast.AST) -> list[tuple[str, str]]:
         if isinstance(node, ast.ImportFrom)
         else []
     )
-
-
-def changed(name: str) -> bool:
-    """Whether a file is another than the one that is checked out."""
-    git = ["git", "-C", str(ROOT), "diff", "--quiet", "HEAD", "--", name]
-    return subprocess.run(git, capture_output=True).returncode == 1
-
-
-def test_readme_has_the_results_of_the_report() -> None:
-    if changed("reports/README.md") and not changed("README.md"):
-        pytest.skip("reports/ are of a run of your own, README's results of the committed one")
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    report = (ROOT / "reports/README.md").read_text(encoding="utf-8")
-    summary = json.loads((ROOT / "reports/summary.json").read_text(encoding="utf-8"))
-    with open(ROOT / "reports/tables/table1.csv", encoding="utf-8", newline="") as file:
-        table = list(csv.reader(file))
-    wanted, inside = {}, {"": [0, 0], ", pull with dips": [0, 0]}
-    for band in ("band1", "band2", "band3"):
-        cells = {}
-        for pull, counts in inside.items():
-            row = next(line for line in report.splitlines() if line.startswith(f"| {band}{pull} |"))
-            cells[pull] = row.split(" | ")
-            held = re.search(r"(\d+) of (\d+), median width", row)
-            counts[:] = [sum(pair) for pair in zip(counts, map(int, held.groups()), strict=True)]
-        plain, dip = cells.values()
-        ours, paper, floor = plain[2:5]
-        package = next(row for row in table if row[:4] == [band, "package_si", "virtual", "all"])[6]
-        wanted[band] = [float(cell) for cell in (dip[2], ours, paper, package, floor)]
-        assert abs(wanted[band][1] - summary[f"{band}_cm"]) < 0.051
-    dips, ours, _, package, floor = zip(*wanted.values(), strict=True)
-    dips, ours, package, floor = (sum(some) / 3 for some in (dips, ours, package, floor))
-    means = [dips, ours, summary["paper_cm"], package, floor]
-    wanted["mean of the bands"] = means
-    for name, numbers in wanted.items():
-        row = next(line for line in readme.splitlines() if re.match(rf"\| {name}\b", line))
-        cells = row.removesuffix(" |").split(" | ")[1:]
-        assert cells == [f"{number:.1f} cm" for number in numbers], name
-    plain, dip = (f"{pair[0]} of {pair[1]}" for pair in inside.values())
-    assert f"{dip} landed inside their 90 % intervals, and {plain} by the paper's pull" in readme
 
 
 def test_what_commands_say_is_quoted_as_they_say_it() -> None:

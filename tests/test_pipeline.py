@@ -225,7 +225,7 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
         "--force",
         "--no-run-cache",
         "--downstream",
-        "history@band1-sling2sim2real",  # of one phase: tests/identification/search/test_loop.py
+        "history@band1-sling2sim2real",  # of one phase: tests/identification
     )
     assert ran == {*of_method(PAPER), "report"}
     assert (project.folder / "dvc.lock").read_text() == before
@@ -368,7 +368,7 @@ CHANGES = {
         EVERYTHING - OWN_CHAIN - EVIDENCE - of_band("record", "floor") - ON_THE_RIG,
     ),
     "the Bayesian optimiser": Change(
-        ("sling2sim2real/identification/optimizers/bo/bayes.py", "# edited\n"),
+        ("sling2sim2real/identification/searches/bayesian.py", "# edited\n"),
         {"ablation_bo@band1-bo"},
         {*of_method("bo", "theta"), "report"},
     ),

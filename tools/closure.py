@@ -4,8 +4,8 @@ DVC re-runs a stage when something listed changes; it cannot see Python's import
 a stage's script imports, at any depth and inside functions too, and lists the folder of each such
 file: one folder a concern. Two things are nobody's dependency, for no result depends on them but
 by the values in params.yaml, which DVC tracks by themselves: the models of its keys, each of
-which stands there, and stages/start.py, which reads the arguments. Optimisers are found by name,
-so that no import says which of them a stage runs: their folders are listed by hand.
+which stands there, and stages/start.py, which reads the arguments. Searches are found by name, so
+that no import says which of them a stage runs: their files are listed by hand.
 
     python tools/closure.py          # says what differs; exit status 1 if anything does
     python tools/closure.py --fix    # rewrite the code dependencies, comments kept
@@ -26,7 +26,7 @@ sys.path.insert(0, str(ROOT))
 
 from sling2sim2real.base.code import CODE, UNTRACKED, closure, concern  # noqa: E402
 
-BY_NAME = "sling2sim2real/identification/optimizers/"
+BY_NAME = "sling2sim2real/identification/searches/"
 
 
 def folders(script: Path, root: Path = ROOT) -> list[str]:

@@ -16,8 +16,9 @@ from sling2sim2real.base.code import ROOT
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_text
 from sling2sim2real.recording.checks.table import CHECKS
+from validation import headline
 from validation.benchmarks import times
-from validation.campaigns import field, landings
+from validation.campaigns import ablations, field, landings
 from validation.campaigns.runner import read
 from validation.reports import row
 
@@ -35,12 +36,13 @@ def checks() -> list[str]:
 
 
 BLOCKS: dict[str, tuple[str, Callable[[], list[str]]]] = {  # by page: name of its marks, its lines
-    "README.md": ("landings", lambda: landings.sentence(read(ROOT / landings.report_of("sealed")))),
+    "README.md": ("landings", headline.block),
     "docs/faq.md": ("checks", checks),
     "docs/identification.md": (
         "landings",
         lambda: landings.table({s: read(ROOT / landings.report_of(s)) for s in landings.SETS}),
     ),
+    "docs/paper.md": ("ablations", lambda: ablations.table(read(ROOT / headline.LARGE))),
     "docs/recording.md": ("field", lambda: field.table(read(ROOT / field.REPORT))),
     "docs/times.md": ("times", lambda: times.table(read(ROOT / times.REPORT))),
 }

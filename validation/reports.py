@@ -5,12 +5,15 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
 
 from sling2sim2real.base.code import ROOT
 from sling2sim2real.base.files import write_json
 from validation.environment import environment
+
+LINE = 125  # characters of a page
 
 
 def write_report(
@@ -42,6 +45,11 @@ def write_report(
     report = provenance | plain(content, digits)
     write_json(path, report)
     return report
+
+
+def paragraph(text: str) -> list[str]:
+    """Lines of a page, of at most LINE characters; a percentage is not parted from its sign."""
+    return [line.replace("\xa0", " ") for line in wrap(text.replace(" %", "\xa0%"), LINE)]
 
 
 def row(*cells: object) -> str:

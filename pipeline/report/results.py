@@ -14,7 +14,7 @@ from sling2sim2real.base.layout import Layout, NotMade, made
 from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.theta import load_theta
-from sling2sim2real.identification.search.regions import Region, load_regions
+from sling2sim2real.identification.searches.regions import Region, load_regions
 from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.measured import load_scores

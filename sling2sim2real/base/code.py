@@ -19,7 +19,7 @@ UNTRACKED = (
 NESTED = (  # folders of folders: what lies in them is a concern by itself, be it folder or file
     "sling2sim2real/",
     "sling2sim2real/identification/",
-    "sling2sim2real/identification/optimizers/",
+    "sling2sim2real/identification/searches/",
     "sling2sim2real/launching/",
     "pipeline/",
     "rig/",

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from sling2sim2real.episode.episode import Episode
+from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluation
-from sling2sim2real.identification.optimizers.cma.refine import refine
 from sling2sim2real.identification.posterior.identify import Identified, fit_posterior
 from sling2sim2real.identification.posterior.launches import Evidence
-from sling2sim2real.identification.search.evaluations import Evaluations
-from sling2sim2real.identification.search.explore import explore
-from sling2sim2real.identification.search.regions import regions_of
+from sling2sim2real.identification.search import explore
+from sling2sim2real.identification.searches.cma_es import refine
+from sling2sim2real.identification.searches.regions import regions_of
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import LEAST_SQUARES
 from sling2sim2real.simulator.model import ClampedBand

@@ -28,7 +28,7 @@ LAWS: dict[str, dict[str, tuple[float, float]]] = {
 LEAST_SQUARES = "least_squares"
 UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
 SEARCHES = ("multistart", LEAST_SQUARES, "de", "bo", "adam")
-STEPS = {  # stages of a search before `theta`; a class of the user's has `search`
+STEPS = {  # stages of a search before `theta`; a function of the user's has `search`
     "multistart": ("history", "clusters", "cma"),
     LEAST_SQUARES: ("history", "density"),
     **{name: (name,) for name in ("de", "bo", "adam")},
@@ -170,7 +170,7 @@ class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
     law: Law = "neo_hookean"
-    search: Annotated[str, _one_of(SEARCHES, "Class")] = "multistart"
+    search: Annotated[str, _one_of(SEARCHES, "function")] = "multistart"
     engine: Annotated[str, _one_of(ENGINES, "function")] = "sling"
     settings: dict[str, Setting] = {}
     fixed: dict[str, Value] = {}

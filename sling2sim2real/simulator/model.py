@@ -67,7 +67,7 @@ class LaunchSetup:
     """What a launch has that a recorded pull has not: projectile, arm, floor, and its steps.
 
     Attributes:
-        projectile_mass: In the pouch [kg].
+        projectile_mass: In the pouch [kg]; one, or one of each launch, shape (N,).
         fork_height: Of the tips above the floor [m].
         foot_height: Of what joins the fork's rods on the floor, which a projectile may hit [m].
         arm_stiffness: Of the arm that holds a band to launch it [N/m], which is sent to the draw
@@ -76,7 +76,7 @@ class LaunchSetup:
         history: Of a law with memory: how the band was drawn; None: it has forgotten all.
     """
 
-    projectile_mass: float
+    projectile_mass: float | np.ndarray
     fork_height: float
     foot_height: float
     arm_stiffness: float | None

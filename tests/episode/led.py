@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sling2sim2real.episode.episode import Episode
-from tests.identification.search import toy
+from tests.identification.objective import toy
 
 GRASP, LIFTED, HANGING, TAUT = 0.5, 1.2, 0.195, 0.22  # s, s, m, m
 MONOTONE = ((1.2, 0.0), (4.2, 0.4), (6.2, 0.4))

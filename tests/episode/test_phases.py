@@ -19,7 +19,7 @@ from sling2sim2real.episode.phases import (
     unseen,
 )
 from tests.episode import led
-from tests.identification.search import toy
+from tests.identification.objective import toy
 
 RELEASE = 2.4
 OFTEN = [(0.0, 0.0), (2e-4, 0.0), (2e-4, 0.002), (5e-4, 0.0)]  # noise and wander of hands

@@ -13,7 +13,7 @@ from pipeline.report import report as reporting
 from pipeline.report import write as writing
 from pipeline.report.results import Result, Results, gather
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.search.regions import Region, save_regions
+from sling2sim2real.identification.searches.regions import Region, save_regions
 from sling2sim2real.launching.trials.measured import save_scores
 from sling2sim2real.simulator.parameters import THETA as NAMES
 from tests.policy.stored import write_stored

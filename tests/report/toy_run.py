@@ -9,7 +9,7 @@ import pandas as pd
 
 from pipeline.params import Params
 from sling2sim2real.base.layout import Layout
-from sling2sim2real.identification.search.regions import Region, save_regions
+from sling2sim2real.identification.searches.regions import Region, save_regions
 from sling2sim2real.launching.trials.measured import Measured, save_scores
 from sling2sim2real.settings.identification import LAWS
 from sling2sim2real.simulator.parameters import THETA as NAMES

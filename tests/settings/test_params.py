@@ -173,7 +173,7 @@ REFUSED = [
     ("weather", 3, "weather: unknown key"),
     ("methods.de.weights", NOTHING, "methods.de.weights: at least one weight"),
     ("methods.de.search", "cmaes", "methods.de.search: must be multistart, least_squares, de"),
-    ("methods.de.search", "my.module:", "or package.module:Class, got 'my.module:'"),
+    ("methods.de.search", "my.module:", "or package.module:function, got 'my.module:'"),
     ("methods.no_work.settings", {"rate": 1}, "methods.no_work: settings are for another"),
     ("methods.de.settings", {"seed": 3}, "methods.de: settings: seed stands under `optimizer`"),
     ("methods.de", CONTENT["methods"]["de"] | NARROW, "must be between 0.45 and 0.49, got 0.4"),

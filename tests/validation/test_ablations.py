@@ -4,32 +4,25 @@ import numpy as np
 import pytest
 
 from pipeline.params import load
-from sling2sim2real.identification.search.build import build
-from sling2sim2real.identification.search.loop import latin_hypercube
+from sling2sim2real.identification.objective.box import latin_hypercube
+from sling2sim2real.identification.searches.differential_evolution import differential_evolution
+from tests.identification.searches.functions import batches_of
 from validation.campaigns.ablations import FIRST, PAPER, Job, jobs_of, summary
 from validation.campaigns.variants import LAST, rollouts_of_search, with_preset, with_variants
-from validation.paired import compared, holm, mean_interval
+from validation.paired import compared, mean_interval
 from validation.projects import DEFAULTS
+from validation.searches import plain_adam, plain_starts, small_batches
 
 
-def test_holm_is_the_textbook_one() -> None:
-    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert holm([0.6, 0.7]) == pytest.approx([1, 1])
-
-
-def test_pairs_are_compared_by_signed_ranks() -> None:
+def test_pairs_are_compared_where_both_are_there() -> None:
     base = np.arange(10.0)
     shifted = base + 1 + 0.01 * np.arange(10)
     broken = np.where(base < 9, shifted, np.nan)
     comparison = compared({"a": base, "shifted": shifted, "broken": broken, "same": base}, "a")
-    assert comparison["shifted"]["p"] == pytest.approx(2 / 2**10)  # all ranks of one sign
-    assert comparison["broken"]["n"] == 9
-    assert comparison["broken"]["p"] == pytest.approx(2 / 2**9)
-    assert comparison["same"]["p_holm"] == 1
-    assert comparison["shifted"]["p_holm"] == pytest.approx(3 * 2 / 2**10)
-    assert (
-        comparison["shifted"]["low"] < comparison["shifted"]["mean"] < comparison["shifted"]["high"]
-    )
+    assert comparison.keys() == {"shifted", "broken", "same"}
+    assert comparison["shifted"]["mean"] == pytest.approx(1.045)
+    assert comparison["shifted"]["low"] < 1.045 < comparison["shifted"]["high"]
+    assert (comparison["broken"]["n"], comparison["same"]["mean"]) == (9, 0)
 
 
 def test_an_interval_holds_the_mean_as_often_as_it_says() -> None:
@@ -40,49 +33,33 @@ def test_an_interval_holds_the_mean_as_often_as_it_says() -> None:
     assert mean_interval([np.nan])["mean"] is None
 
 
-def spent(optimizer, rollouts: int) -> tuple[np.ndarray, list[tuple[str, int]]]:
-    """All points of a search of a tilted bowl, and its batches' phases and sizes."""
-    points, batches = [], []
-    while rollouts > 0:
-        requested = optimizer.ask()
-        batches.append((optimizer.phase, len(requested)))
-        optimizer.tell(bowl(requested))
-        points.append(requested)
-        rollouts -= len(requested)
-    return np.concatenate(points), batches
-
-
 def bowl(points: np.ndarray) -> np.ndarray:
     return np.sum((points - 0.3) ** 2, axis=1)
 
 
 def test_plain_starts_explore_alike_and_begin_as_wide_balls() -> None:
-    options = {"rollouts": 160, "seed": 4, "population": 10}
+    options = {"seed": 4, "population": 10}
     settings = {"generations": 3, "k_top": 2, "delta": 0.1, "cma_population": 60}
-    points, batches = spent(build("validation.searches:PlainStarts", 3, **options, **settings), 160)
-    explored, _ = spent(build("de", 3, **options), 40)
-    assert batches == [("de", 10)] * 4 + [("cma", 120)]
-    assert np.array_equal(points[:40], explored)
+    batches = batches_of(plain_starts, bowl, 3, 160, **options, **settings)
+    explored = np.concatenate(batches_of(differential_evolution, bowl, 3, 40, **options))
+    assert [len(batch) for batch in batches] == [10] * 4 + [120]
+    assert np.array_equal(np.concatenate(batches[:4]), explored)
     centre = explored[np.argmin(bowl(explored))]
-    first = points[40:100]  # of the best region's solver; reflected at the box's faces
+    first = batches[4][:60]  # of the best region's solver; reflected at the box's faces
     assert np.abs(first - centre).std() > 0.1
     assert np.corrcoef(first.T)[np.triu_indices(3, 1)] == pytest.approx(0, abs=0.4)
 
 
-def test_small_batches_see_every_point() -> None:
-    options = {"rollouts": 16, "seed": 1, "population": 8}
-    optimizer = build("validation.searches:SmallBatches", 2, **options)
-    points, batches = spent(optimizer, 16)
-    assert [size for _, size in batches] == [8, 4, 4]
-    assert optimizer._points >= len(points)
+def test_small_batches_are_of_four() -> None:
+    batches = batches_of(small_batches, bowl, 2, 16, seed=1, population=8)
+    assert [len(batch) for batch in batches] == [8, 4, 4]
 
 
 def test_plain_adam_descends_from_one_point() -> None:
-    options = {"rollouts": 240, "seed": 2, "population": 20}
-    points, batches = spent(build("validation.searches:PlainAdam", 3, **options), 240)
-    assert {size for _, size in batches} == {4}
-    assert points[0] == pytest.approx(latin_hypercube(3, 1, 2)[0])
-    assert bowl(points[-1:])[0] < 0.01 < bowl(points[:1])[0]
+    batches = batches_of(plain_adam, bowl, 3, 240, seed=2, population=20)
+    assert {len(batch) for batch in batches} == {4}
+    assert batches[0][0] == pytest.approx(latin_hypercube(3, 1, 2)[0])
+    assert bowl(batches[-1])[0] < 0.01 < bowl(batches[0])[0]
 
 
 def results(offset: dict[str, float]) -> list[dict]:

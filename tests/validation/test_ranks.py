@@ -29,6 +29,8 @@ def test_a_right_posterior_has_even_ranks() -> None:
     right = ranks()
     assert right["p"] > 0.05 and right["coverage"] == pytest.approx(0.9, abs=0.03)
     assert right["histogram"].sum() == EPISODES and right["histogram"].min() > EPISODES / 20
+    low, high = right["coverage_interval"]
+    assert low < right["coverage"] < high and high - low == pytest.approx(0.06, abs=0.01)
     assert right["mean"] == pytest.approx(0.5, abs=0.03)
     assert right["spread"] == pytest.approx(1, abs=0.05)
 

@@ -87,6 +87,8 @@ def aimed(outcome: Calibrated, params: Params, targets: Sequence[float] = TARGET
 def scored(outcome: Calibrated, params: Params, world: World, seed: int = 0) -> dict:
     """Launches at TARGETS in the world: errors without noise, and one launch each with noise.
 
+    Every landing counts, also one beyond the target area.
+
     Returns:
         "draws" (T, 2); "error" of the landing as a share of the target, without noise; "miss" [m]
         with it; "low", "high" of the 90 % interval and "inside"; NaN where there is none.
@@ -97,7 +99,7 @@ def scored(outcome: Calibrated, params: Params, world: World, seed: int = 0) -> 
     intervals = np.full((len(draws), 2), np.nan)
     landing[good] = world.exact(draws[good]).landing_y
     numbers = 1000 * (seed + 1) + np.flatnonzero(good)
-    noisy[good] = world.landings(draws[good], numbers[:, None])[:, 0]
+    noisy[good] = [trial.landing_y for trial in world.trials(draws[good], numbers.tolist())]
     if outcome.samples is not None and good.any():
         error = params.trials.actuation_error
         intervals[good] = landing_intervals(outcome, draws[good], outcome.samples, error)
@@ -122,22 +124,34 @@ def saved(params: Params, path: Path) -> Path:
 
 
 def summary(results: list[dict]) -> dict:
-    """Summarise results at TARGETS: misses [m]; error, coverage, width as shares."""
+    """Summarise a band's recordings, each scored at TARGETS.
+
+    Returns:
+        "bias" of each recording, the mean error of its launches; its mean over recordings and that
+        of its size, as shares of the distance; "mean_miss_m"; of the launches with an interval
+        "launches", "coverage", and that of each recording; "median_width"; "failed": launches that
+        had no draw or did not land. Without intervals coverage and width are NaN.
+    """
     error, miss, low, high = (
         np.array([result[name] for result in results], float)
         for name in ("error", "miss", "low", "high")
     )
     finite = np.isfinite(low) & np.isfinite(miss)
-    inside = np.array([result["inside"] for result in results])[finite]
+    inside = finite & (TARGETS + miss >= low) & (TARGETS + miss <= high)
+    bias, count = np.nanmean(error, axis=1), finite.sum(axis=1)
+    covered = np.full(len(results), np.nan)
+    np.divide(inside.sum(axis=1), count, out=covered, where=count > 0)
     width = ((high - low) / TARGETS)[finite]
     return {
-        "bias": np.nanmean(error, axis=1),
-        "mean_bias": np.nanmean(error),
+        "bias": bias,
+        "mean_bias": np.nanmean(bias),
+        "mean_size_of_bias": np.nanmean(np.abs(bias)),
         "mean_miss_m": np.nanmean(np.abs(miss)),
-        "failed": int(np.isnan(error).sum()),
-        "coverage": inside.mean() if finite.any() else np.nan,
+        "failed": int((np.isnan(error) | np.isnan(miss)).sum()),
+        "coverage": inside.sum() / finite.sum() if finite.any() else np.nan,
+        "coverage_of_each": covered,
         "launches": int(finite.sum()),
-        "median_width": np.nanmedian(width) if finite.any() else np.nan,
+        "median_width": np.median(width) if finite.any() else np.nan,
     }
 
 

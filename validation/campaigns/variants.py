@@ -6,7 +6,7 @@ from ruamel.yaml import YAML
 
 from pipeline.params import Params
 from sling2sim2real.base.code import ROOT
-from sling2sim2real.identification.search.explore import rollouts_of
+from sling2sim2real.identification.search import rollouts_of
 from validation.campaigns.runner import PAPER
 
 PRESETS = ROOT / "presets"
@@ -31,10 +31,10 @@ def with_variants(params: Params) -> Params:
         return paper.model_copy(update={"search": search, "settings": settings})
 
     methods = dict(params.methods.items()) | {
-        "no_covariance_plain": variant("PlainStarts", k_top=optimizer.k_top, **starts),
-        "no_covariance_no_multistart_plain": variant("PlainStarts", k_top=1, **starts),
-        LAST: variant("SmallBatches"),
-        "plain_adam": variant("PlainAdam"),
+        "no_covariance_plain": variant("plain_starts", k_top=optimizer.k_top, **starts),
+        "no_covariance_no_multistart_plain": variant("plain_starts", k_top=1, **starts),
+        LAST: variant("small_batches"),
+        "plain_adam": variant("plain_adam"),
         "no_clamp_calibration": paper.model_copy(update={"mounting": False}),
     }
     return params.model_copy(update={"methods": methods})

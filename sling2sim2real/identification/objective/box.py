@@ -118,3 +118,15 @@ def reflect(unit: np.ndarray) -> np.ndarray:
     """Fold points at the faces of the unit cube until they lie in it; those inside stay."""
     folded = np.mod(unit, 2.0)
     return np.where(folded > 1.0, 2.0 - folded, folded)
+
+
+def latin_hypercube(dimension: int, count: int, seed: int) -> np.ndarray:
+    """Points of the unit cube, one in each of `count` strata of each axis, (count, dimension).
+
+    SciPy's differential evolution shifts what it is given by a half and back; these points stand
+    that to the last bit, so that all searches start with the very same ones.
+    """
+    from scipy.stats import qmc  # which takes half a second
+
+    points = qmc.LatinHypercube(dimension, rng=np.random.default_rng(seed)).random(count)
+    return (points - 0.5) + 0.5

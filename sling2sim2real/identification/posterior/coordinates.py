@@ -40,9 +40,9 @@ STEPS = {  # of finite differences
     "softening": 0.02,
     "relaxation": 0.004,
     "flow": 0.01,
-    "log_flow_rate": 0.1,
+    "log_flow_rate": 0.03,
     "air_drag": 0.25,
-    "turn_damping": 0.5,
+    "turn_damping": 0.1,
     "log_returned_share": 0.01,
 }
 # Of 9 in 10 rubbers at 10 to 100 Hz: the range from butadiene to butyl rubber, by

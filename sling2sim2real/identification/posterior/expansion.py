@@ -43,7 +43,8 @@ class Expansion:
         spread: Standard deviations of the simulated ones, given phi, (3,).
         residuals, left: What was compared, and what of it is left at d = 0, shape (R,).
         elimination: Takes the nuisances out of other residuals too.
-        uncounted: What the loss factor does to the force, which does not count, shape (R,).
+        uncounted: What the loss factor does to the force, which does not count, shape (R,): from
+            `origin` on, the logarithm of the loss factor where a pass of the fit began.
     """
 
     misfit: float
@@ -55,6 +56,7 @@ class Expansion:
     left: np.ndarray
     elimination: NuisanceProjection
     uncounted: np.ndarray
+    origin: float
 
     def rms(self, part: str) -> float:
         """Root mean square of what is left of force [N], held or recoil [m]; 0 of nothing."""

@@ -21,12 +21,10 @@ from sling2sim2real.identification.posterior.expansion import Expansion
 from sling2sim2real.identification.posterior.launches import LaunchExpansion, LaunchLikelihood
 from sling2sim2real.identification.posterior.likelihood import Failed, Likelihood
 
-ITERATIONS = 60  # at most
-BINNED = 4  # of them sort the points into bins anew; then the density keeps its form
-ANEW, FINER = 2, 0.25  # how often a fit that is stuck sorts them anew, by finer differences
+PASSES = 6  # at most; each sorts the points into bins anew, where the last one ended
+ITERATIONS = 30  # of a pass, at most
 LONGEST = 20.0  # of a step, in those of the finite differences
-STILL = 0.2  # of a last step, in standard deviations: no interval is 2 % wider by as much
-SHORT = 0.25  # of that: a damped step where the fit is stuck
+STILL = 0.1  # of a last step, in standard deviations: no interval is 1 % wider by as much
 FLAT = 0.2  # of -2 log p: so little that a step which changes it by less tells nothing apart
 NEAR = 1.0  # standard deviations that such a step may go
 LEAST = 1e-12  # of a precision
@@ -75,6 +73,10 @@ def fit(
 ) -> Fit:
     """Fit coordinates from `start` (D,). Raises NoFit.
 
+    Each pass has a density of one form: bins, and what the loss factor does to the force, are
+    those of its first expansion. Misfits of different passes do not compare. It is settled where
+    a pass ends near to where it began.
+
     A step into the failure of a recording's simulation, or of a launch that landed, is none. A
     launch that fails from the start counts as soon as a step makes it land.
 
@@ -83,60 +85,92 @@ def fit(
         workers: Threads; they change no result.
         progress: Called for each expansion that is nearer.
     """
-    phi, nuisances = np.array(start, float), np.zeros((len(recordings), 3))
-    best: Fit | None = None
-    damp, gone, new = DAMP, np.inf, [None] * len(recordings)
-    anew, sort = 0, True
+    steps = 0
     with ThreadPoolExecutor(workers) as pool:
-        for steps in range(1, ITERATIONS + 1):
-            sort = sort or steps <= BINNED
-            bins = [x.residuals for x in best.expansions] if best and not sort else new
-            around = coordinates.parameters, phi, FINER**anew * _steps(coordinates, phi)
+
+        def expanded(phi: np.ndarray, nuisances: np.ndarray, reference: Fit | None) -> Fit:
+            nonlocal steps
+            steps += 1
+            around = coordinates.parameters, phi, _steps(coordinates, phi)
+            references = reference.expansions if reference else [None] * len(recordings)
+            expansions = [
+                likelihood.expand(*around, nuisance, pool, fixed)
+                for likelihood, nuisance, fixed in zip(
+                    recordings, nuisances, references, strict=True
+                )
+            ]
+            launched = launches.expand(*around) if launches else None
+            return _density(coordinates, phi, nuisances, expansions, launched, steps)
+
+        phi, nuisances = np.array(start, float), np.zeros((len(recordings), 3))
+        best, near = None, False
+        for _ in range(PASSES):
             try:
-                expansions = [
-                    likelihood.expand(*around, nuisance, pool, retained)
-                    for likelihood, nuisance, retained in zip(
-                        recordings, nuisances, bins, strict=True
-                    )
-                ]
+                begun = expanded(phi, nuisances, None)
             except Failed as why:
-                if best is None:
-                    raise NoFit(
-                        f"{recordings[0].episode.band}: the simulation at the start of the fit"
-                        f" fails: {why}"
-                    ) from None
-                trial = None
-            else:
-                launched = launches.expand(*around) if launches else None
-                trial = _density(coordinates, phi, nuisances, expansions, launched, steps)
-            if best and trial and _fails_more(trial, best):
-                trial = None
-            if trial and (best is None or _nearer(trial, best) or sort):
-                best, damp = trial, damp * EASIER
-                progress(best)
-            else:
-                if trial and best and trial.misfit < best.misfit + FLAT and gone < NEAR:
-                    return replace(best, settled=True, steps=steps)
-                damp = max(damp * HARDER, HALF)
-            assert best is not None  # else NoFit
-            sort = False
-            step = _step(best, coordinates, damp)
-            gone = _size(best, step)
-            # Damping makes any step short, also where the fit is stuck.
-            settled = _size(best, _step(best, coordinates, min(damp, DAMP))) < STILL
-            if settled or gone < SHORT * STILL or damp > HARDEST:
-                if settled or anew == ANEW:
-                    return replace(best, settled=settled, steps=steps)
-                anew, sort, damp, step = anew + 1, True, DAMP, 0 * step
-            phi = best.phi + step
-            nuisances = np.array(
-                [
-                    nuisance + expansion.nuisances[0] / (1 + damp) + expansion.nuisances[1] @ step
-                    for nuisance, expansion in zip(best.nuisances, best.expansions, strict=True)
-                ]
-            )
+                raise NoFit(
+                    f"{recordings[0].episode.band}: the simulation at the start of the fit"
+                    f" fails: {why}"
+                ) from None
+            progress(begun)
+            best = _descended(begun, coordinates, expanded, progress)
+            near = _size(best, best.phi - begun.phi) < STILL
+            phi, nuisances = best.phi, best.nuisances
+            if near or not best.settled:
+                break
     assert best is not None
-    return replace(best, steps=ITERATIONS)
+    return replace(best, settled=best.settled and near, steps=steps)
+
+
+def _descended(
+    best: Fit,
+    coordinates: Coordinates,
+    expanded: Callable[[np.ndarray, np.ndarray, Fit | None], Fit],
+    progress: Callable[[Fit], None],
+) -> Fit:
+    """The mode of one pass by Levenberg-Marquardt from its first expansion."""
+    damp = DAMP
+    for _ in range(ITERATIONS):
+        if _size(best, _step(best, coordinates, min(damp, DAMP))) < STILL:
+            return replace(best, settled=True)  # damping makes any step short
+        step = _step(best, coordinates, damp)
+        nuisances = np.array(
+            [
+                nuisance + expansion.nuisances[0] / (1 + damp) + expansion.nuisances[1] @ step
+                for nuisance, expansion in zip(best.nuisances, best.expansions, strict=True)
+            ]
+        )
+        try:
+            trial = expanded(best.phi + step, nuisances, best)
+        except Failed:
+            trial = None
+        if trial and _fails_more(trial, best):
+            trial = None
+        if trial and _nearer(trial, best):
+            best, damp = trial, damp * EASIER
+            progress(best)
+            continue
+        if trial and trial.misfit < best.misfit + FLAT and _size(best, step) < NEAR:
+            return replace(best, settled=True)
+        damp = max(damp * HARDER, HALF)
+        if damp > HARDEST:
+            break
+    return best
+
+
+def widened(fitted: Fit, coordinates: Coordinates, by: float) -> Fit:
+    """The density where all evidence, but no prior, is less sure: standard deviations times `by`.
+
+    A gradient counts where it leads out of the bounds. Elsewhere it is what a settled fit left of
+    a step that led no further.
+    """
+    low, high = coordinates.low, coordinates.high
+    outward = np.where(fitted.gradient < 0, fitted.phi <= low, fitted.phi >= high)
+    prior = coordinates.precision
+    pull = prior * (coordinates.expected - fitted.phi)
+    hessian = (fitted.hessian - np.diag(prior)) / by**2 + np.diag(prior)
+    gradient = (fitted.gradient * outward - pull) / by**2 + pull
+    return replace(fitted, hessian=hessian, gradient=gradient)
 
 
 def _fails_more(trial: Fit, best: Fit) -> bool:

@@ -18,7 +18,7 @@ from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.pull import deepest_draw, launch_history
 from sling2sim2real.episode.signal import cutoff_hz
 from sling2sim2real.identification.posterior.coordinates import Coordinates
-from sling2sim2real.identification.posterior.fit import Fit, fit
+from sling2sim2real.identification.posterior.fit import Fit, fit, widened
 from sling2sim2real.identification.posterior.launches import (
     Evidence,
     LaunchLikelihood,
@@ -46,7 +46,8 @@ class Identified:
 
     Attributes:
         coordinates, fit: The density, and its mode.
-        birge: By what the recordings' disagreement widens each standard deviation; 1 for one.
+        birge: By what the recordings' disagreement widens the evidence's standard deviations; 1
+            for one. Priors stay as they are.
         samples: Of the coordinates, within bounds, shape (SAMPLES, D).
         effective, batches: How many samples of even weight these are worth, and how many batches
             of SAMPLES rollouts they took of each recording.
@@ -61,6 +62,11 @@ class Identified:
     batches: int
     recordings: list[Likelihood]
     launches: LaunchLikelihood | None
+
+    @property
+    def density(self) -> Fit:
+        """The Gaussian around the mode, as wide as the recordings differ."""
+        return widened(self.fit, self.coordinates, self.birge)
 
     @property
     def mode(self) -> Parameters:
@@ -275,11 +281,11 @@ def _clocks(identified: Identified) -> dict:
     """Release and camera's delay of the first recording, with what its expansion leaves open."""
     expansion, nuisances = identified.fit.expansions[0], identified.fit.nuisances[0]
     change = expansion.nuisances[1]
-    covariance = np.linalg.inv(identified.fit.hessian)
+    covariance = np.linalg.inv(identified.density.hessian)
     spread = np.sqrt(expansion.spread**2 + np.einsum("id,de,ie->i", change, covariance, change))
     release, camera = (SIMULATED.index(name) for name in ("release", "camera"))
     time = identified.recordings[0].episode.release_time + nuisances[release]
-    wide = 1.645 * spread * identified.birge
+    wide = 1.645 * spread
     return {
         name: {"value": value, "low": value - wide[i], "high": value + wide[i], "unit": "s"}
         for name, value, i in (
@@ -325,9 +331,8 @@ def _launched(identified: Identified) -> list[dict]:
     launches, expansion = identified.launches, identified.fit.launches
     if launches is None or expansion is None:
         return []
-    unlikely = without_each(
-        expansion, identified.fit.hessian, identified.fit.gradient, identified.birge
-    )
+    density = identified.density
+    unlikely = without_each(expansion, density.hessian, density.gradient, identified.birge)
     parts = launches.draws, launches.landings, expansion.left, unlikely
     return [
         {

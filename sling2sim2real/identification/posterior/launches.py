@@ -179,7 +179,7 @@ class LaunchLikelihood:
 
 
 def without_each(
-    launches: LaunchExpansion, hessian: np.ndarray, gradient: np.ndarray, widened: float = 1.0
+    launches: LaunchExpansion, hessian: np.ndarray, gradient: np.ndarray, widening: float = 1.0
 ) -> np.ndarray:
     """How unlikely each launch is by all other evidence, as a standard score (leave-one-out).
 
@@ -187,8 +187,8 @@ def without_each(
     gradient g - d gap, d its column of `design`.
 
     Args:
-        hessian, gradient: Of the whole density at its mode, shapes (D, D) and (D,).
-        widened: By what the density's standard deviations are multiplied.
+        hessian, gradient: Of the density at its mode, widened, shapes (D, D) and (D,).
+        widening: By what the evidence's standard deviations are multiplied in it.
 
     Returns:
         Shape (N,); positive where it landed further than predicted, NaN for a launch that fails.
@@ -196,8 +196,7 @@ def without_each(
     scores = np.full(len(launches.gap), np.nan)
     for i in np.flatnonzero(~launches.failed):
         gap, slope = launches.gap[i], launches.design[:, i]
-        rest = hessian - np.outer(slope, slope)
-        left = gap - slope @ np.linalg.solve(rest, gradient - slope * gap)
-        variance = 1 + widened**2 * slope @ np.linalg.solve(rest, slope)
-        scores[i] = left / np.sqrt(variance)
+        rest = hessian - np.outer(slope, slope) / widening**2
+        left = gap - slope @ np.linalg.solve(rest, gradient - slope * gap / widening**2)
+        scores[i] = left / np.sqrt(1 + slope @ np.linalg.solve(rest, slope))
     return scores

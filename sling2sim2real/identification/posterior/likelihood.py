@@ -197,14 +197,15 @@ class Likelihood:
         steps: np.ndarray,
         nuisances: np.ndarray,
         pool: Executor,
-        residuals: Residuals | None = None,
+        reference: Expansion | None = None,
     ) -> Expansion:
         """Expand around coordinates (D,) with finite differences `steps` (D,). Raises Failed.
 
         Args:
             parameters_of: Of coordinates (N, D), as `Coordinates.parameters`.
             pool: Maps over batches of rollouts.
-            residuals: Whose bins are taken; None: bins of the rollout there.
+            reference: Whose bins and whose effect of the loss factor on the force are taken; None:
+                those of the rollout there.
         """
         around = parameters_of(phi + np.vstack([0 * steps, np.diag(steps)]))
         release, _, hand = np.diag(NUDGE)
@@ -215,21 +216,27 @@ class Likelihood:
         ]
         (first, later), (released,), (led,) = pool.map(lambda job: self.simulate(*job), jobs)
         later = replace(later, force=later.force[:1], center_line=later.center_line[:1])
-        residuals = residuals or Residuals(
-            self.episode, self.sling, self.cutoff, first.center_line[0]
+        residuals = (
+            reference.residuals
+            if reference
+            else Residuals(self.episode, self.sling, self.cutoff, first.center_line[0])
         )
         vectors = residuals(first)
         moved = np.concatenate([residuals(rollouts) for rollouts in (released, later, led)])
         gap = vectors[0]
         slopes = (vectors[1:] - gap) / steps[:, None]
+        nuisance_slopes = (moved - gap) / NUDGE[:, None]
         # The force tells nothing of the loss factor, the recoil does: a law that lacks slow
         # hysteresis would take the one for the other.
-        uncounted = slopes[LOSS].copy()
-        uncounted[3 * len(residuals.samples) :] = 0.0
+        if reference:
+            uncounted, origin = reference.uncounted, reference.origin
+        else:
+            uncounted, origin = slopes[LOSS].copy(), float(phi[LOSS])
+            uncounted[3 * len(residuals.samples) :] = 0.0
         slopes[LOSS] -= uncounted
-        nuisance_slopes = (moved - gap) / NUDGE[:, None]
+        gap = gap - (phi[LOSS] - origin) * uncounted
         expansion = self._eliminated(residuals, gap, slopes, nuisance_slopes, nuisances)
-        return replace(expansion, uncounted=uncounted)
+        return replace(expansion, uncounted=uncounted, origin=origin)
 
     def remaining(
         self,
@@ -246,7 +253,7 @@ class Likelihood:
 
         Args:
             nuisances: Where the expansion was made, shape (3,).
-            loss: Changes of the logarithm of the loss factor since, shape (N,).
+            loss: The logarithm of the loss factor, shape (N,).
 
         Returns:
             Shape (N, R + K).
@@ -254,7 +261,8 @@ class Likelihood:
         seen = self.shifted(nuisances)
         until = max(seen.cloud_time, default=np.inf)
         done = interact(self.sling, seen, parameters, until=until, workers=workers)
-        residuals = expansion.residuals(done) - np.outer(loss, expansion.uncounted)
+        changed = np.outer(loss - expansion.origin, expansion.uncounted)
+        residuals = expansion.residuals(done) - changed
         left = expansion.elimination(residuals)
         left[[why is not None for why in done.failure]] = np.nan
         return left
@@ -309,6 +317,7 @@ class Likelihood:
             left=(left - best_linear @ design[m]) / weight,
             elimination=NuisanceProjection(weight, priors, np.linalg.qr(effects)[0]),
             uncounted=np.zeros(len(left)),
+            origin=0.0,
         )
 
     def _linear(self, residuals: Residuals, gap: np.ndarray, camera: np.ndarray) -> np.ndarray:

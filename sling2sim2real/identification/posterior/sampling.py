@@ -21,7 +21,7 @@ from numpy.random import RandomState  # emcee's
 
 from sling2sim2real.identification.posterior.coordinates import LOSS, Coordinates
 from sling2sim2real.identification.posterior.draws import truncated_gaussian
-from sling2sim2real.identification.posterior.fit import Fit
+from sling2sim2real.identification.posterior.fit import Fit, widened
 from sling2sim2real.identification.posterior.launches import LaunchLikelihood
 from sling2sim2real.identification.posterior.likelihood import Likelihood
 
@@ -52,7 +52,7 @@ class Remaining:
     def __call__(self, phi: np.ndarray) -> np.ndarray:
         """What is left at coordinates (N, D), shape (N, R); NaN where a simulation fails."""
         fitted, parameters = self.fitted, self.coordinates.parameters(phi)
-        loss = phi[:, LOSS] - fitted.phi[LOSS]
+        loss = phi[:, LOSS]
         left = [
             recording.remaining(parameters, expansion, nuisances, loss, self.workers)
             for recording, expansion, nuisances in zip(
@@ -70,29 +70,26 @@ def log_density(
     """Logarithm of the density at N coordinates by their misfits (N,), NaN for a failure.
 
     Args:
-        widened: By what all standard deviations are multiplied.
+        widened: By what the evidence's standard deviations are multiplied.
     """
     prior = (phi - coordinates.expected) ** 2 @ coordinates.precision
-    value = -0.5 * (np.nan_to_num(misfit, nan=np.inf) + prior) / widened**2
+    value = -0.5 * (np.nan_to_num(misfit, nan=np.inf) / widened**2 + prior)
     inside = np.all((phi >= coordinates.low) & (phi <= coordinates.high), axis=1)
     return np.where(inside, value, -np.inf)
 
 
-def samples_around(
-    fitted: Fit, coordinates: Coordinates, widened: float, rng: np.random.Generator
-) -> np.ndarray:
-    """SAMPLES of the Gaussian around a mode, within bounds, shape (SAMPLES, D).
-
-    A gradient counts where it leads out of the bounds. Elsewhere it is what a settled fit left of
-    a step that led no further, and would move the samples away from the mode.
+def samples_around(density: Fit, coordinates: Coordinates, rng: np.random.Generator) -> np.ndarray:
+    """SAMPLES of a Gaussian around a mode, WIDER than the density there and within bounds.
 
     Args:
-        widened: By what the density's standard deviations are multiplied.
+        density: As `widened` gives it.
+
+    Returns:
+        Shape (SAMPLES, D).
     """
     box = coordinates.low, coordinates.high
-    outward = np.where(fitted.gradient < 0, fitted.phi <= box[0], fitted.phi >= box[1])
-    centre = fitted.phi + np.linalg.solve(fitted.hessian, fitted.gradient * outward)
-    return truncated_gaussian(centre, fitted.hessian / widened**2, *box, SAMPLES, rng)
+    centre = density.phi + np.linalg.solve(density.hessian, density.gradient)
+    return truncated_gaussian(centre, density.hessian / WIDER**2, *box, SAMPLES, rng)
 
 
 @dataclass(frozen=True)
@@ -136,22 +133,23 @@ def _terms(x: np.ndarray) -> np.ndarray:
     return np.hstack([np.ones((len(x), 1)), x, x[:, first] * x[:, second]])
 
 
-def samples_of(remaining: Remaining, widened: float, seed: int) -> tuple[np.ndarray, float, int]:
+def samples_of(remaining: Remaining, widening: float, seed: int) -> tuple[np.ndarray, float, int]:
     """SAMPLES of the density around a fit, and how many of even weight they are worth.
 
     Args:
-        widened: By what all standard deviations are multiplied.
+        widening: By what the evidence's standard deviations are multiplied.
 
     Returns:
         Shape (SAMPLES, D), some of them alike; the effective number: 0, with those of the widened
         Gaussian, where all simulations fail; and how many batches were simulated.
     """
-    fitted, coordinates, random = remaining.fitted, remaining.coordinates, RandomState(seed)
-    scale = widened * np.sqrt(np.diag(np.linalg.inv(fitted.hessian)))
-    batch = samples_around(fitted, coordinates, WIDER * widened, np.random.default_rng(seed))
+    coordinates, random = remaining.coordinates, RandomState(seed)
+    density = widened(remaining.fitted, coordinates, widening)
+    scale = np.sqrt(np.diag(np.linalg.inv(density.hessian)))
+    batch = samples_around(density, coordinates, np.random.default_rng(seed))
 
     def log(phi: np.ndarray, misfit: np.ndarray) -> np.ndarray:
-        return log_density(coordinates, phi, misfit, widened)
+        return log_density(coordinates, phi, misfit, widening)
 
     surface, phi, left, best, count = None, batch[:0], None, (batch, 0.0), 0
     while count < BATCHES:
@@ -167,9 +165,9 @@ def samples_of(remaining: Remaining, widened: float, seed: int) -> tuple[np.ndar
         good = np.isfinite(left).all(axis=1)
         if not good.any():
             break
-        density = log(phi[good], np.sum(left[good] ** 2, axis=1))
-        weight = np.exp(TEMPER * (density - density.max()))
-        surface = QuadraticSurface.fitted(fitted.phi, scale, phi[good], left[good], weight)
+        logs = log(phi[good], np.sum(left[good] ** 2, axis=1))
+        weight = np.exp(TEMPER * (logs - logs.max()))
+        surface = QuadraticSurface.fitted(density.phi, scale, phi[good], left[good], weight)
         batch = _evolved(lambda at, by=surface: log(at, by.misfit(at)), batch, random)
     return *best, count
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from sling2sim2real.identification.objective.chamfer import LANES, SAMPLES, Chamfer
-from tests.identification.search.toy import LENGTH, RADIUS, by_spreads, facing, straight
+from tests.identification.objective.toy import LENGTH, RADIUS, by_spreads, facing, straight
 
 CAMERA = np.array([1.0, -0.8, 0.6])
 

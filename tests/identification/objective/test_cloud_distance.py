@@ -13,7 +13,7 @@ from sling2sim2real.identification.objective.chamfer import (
     Chamfer,
     CloudDistance,
 )
-from tests.identification.search.toy import (
+from tests.identification.objective.toy import (
     LENGTH,
     RADIUS,
     by_spreads,

@@ -19,8 +19,8 @@ from sling2sim2real.identification.objective.kernel import clouds_kernel, terms_
 from sling2sim2real.identification.objective.loss import TERMS, EpisodeLoss
 from sling2sim2real.simulator.interaction import interact
 from sling2sim2real.simulator.parameters import Parameters
-from tests.identification.search import toy
-from tests.identification.search.toy import loss_of
+from tests.identification.objective import toy
+from tests.identification.objective.toy import loss_of
 from tests.project import DEFAULTS
 from validation.synthetic import THETA, own_law_episode, recorded_yardstick
 

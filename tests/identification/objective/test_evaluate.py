@@ -12,7 +12,7 @@ from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.objective.loss import TERMS, EpisodeLoss
 from sling2sim2real.simulator.parameters import THETA
-from tests.identification.search import toy
+from tests.identification.objective import toy
 from tests.project import DEFAULTS
 from validation.synthetic import recorded_yardstick
 

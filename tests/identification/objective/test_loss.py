@@ -5,8 +5,8 @@ import pytest
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.signal import average, lowpass
-from tests.identification.search import toy
-from tests.identification.search.toy import loss_of
+from tests.identification.objective import toy
+from tests.identification.objective.toy import loss_of
 
 
 def test_a_perfect_simulation_costs_nothing_and_one_unit_reads_one() -> None:

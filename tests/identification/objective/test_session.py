@@ -8,8 +8,8 @@ from pipeline.params import load
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.base.progress import parse
 from sling2sim2real.identification.objective import session
-from tests.identification.search import toy
-from tests.identification.search.functions import Evaluate, rosenbrock
+from tests.identification.objective import toy
+from tests.identification.searches.functions import Evaluate, rosenbrock
 from tests.project import DEFAULTS
 
 PARAMS = load(DEFAULTS)

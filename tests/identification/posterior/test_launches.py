@@ -165,7 +165,7 @@ def test_a_launch_is_held_against_what_all_else_predicts() -> None:
         assert scores[index] == pytest.approx(
             predicted / np.sqrt(1 + slope @ covariance @ slope), rel=1e-6
         )
-    wider = without_each(both, prior + both.hessian, both.gradient, widened=3.0)
+    wider = without_each(both, prior + both.hessian / 9, both.gradient / 9, widening=3.0)
     assert np.all(np.abs(wider) < np.abs(scores))
     failed = expanded(near, Observed((-0.5, 0.2), 0.001, 0.31))
     assert np.isnan(without_each(failed, prior + failed.hessian, failed.gradient)[1])

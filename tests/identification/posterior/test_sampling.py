@@ -8,6 +8,7 @@ import pytest
 from numpy.random import RandomState
 
 from sling2sim2real.identification.posterior import sampling
+from sling2sim2real.identification.posterior.fit import Fit
 from sling2sim2real.identification.posterior.sampling import SAMPLES, QuadraticSurface, samples_of
 from tests.identification.posterior.toy import SIZE, space
 
@@ -30,7 +31,8 @@ def target(seen=residuals, slopes=SLOPES) -> SimpleNamespace:
     coordinates = replace(space(), precision=precision)
     slope = np.pad(slopes, ((0, 0), (0, 1))) / SIZE
     hessian = slope.T @ slope + np.diag(coordinates.precision)
-    fitted = SimpleNamespace(phi=AT * SIZE, hessian=hessian, gradient=np.zeros(3))
+    there = AT * SIZE, hessian, np.zeros(3), np.zeros((0, 3))
+    fitted = Fit(*there, expansions=[], launches=None, misfit=0.0, steps=1, settled=True)
 
     class Evidence(SimpleNamespace):
         def __call__(self, phi: np.ndarray) -> np.ndarray:

@@ -39,8 +39,8 @@ class Curve:
         self.seen, self.sigma, self.fails = seen, sigma, fails
         self.episode, self.retained, self.requested = SimpleNamespace(band="toy"), [], []
 
-    def expand(self, points, phi, steps, nuisances, pool, residuals=None) -> SimpleNamespace:
-        self.retained.append(residuals)
+    def expand(self, points, phi, steps, nuisances, pool, reference=None) -> SimpleNamespace:
+        self.retained.append(reference and reference.residuals)
         self.requested.append(phi)
         if self.fails(phi):
             raise Failed("it broke")
@@ -50,7 +50,7 @@ class Curve:
             hessian=design @ design.T,
             gradient=design @ left,
             nuisances=(np.zeros(3), np.zeros((3, 3))),
-            residuals=len(self.retained),
+            residuals=reference.residuals if reference else len(self.retained),
         )
 
 

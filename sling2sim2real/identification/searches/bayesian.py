@@ -14,11 +14,12 @@ import numpy as np
 from scipy.stats import qmc
 
 from sling2sim2real.base.machine import one_thread
-from sling2sim2real.identification.objective.box import reflect
-from sling2sim2real.identification.search.loop import latin_hypercube
+from sling2sim2real.identification.objective.box import latin_hypercube, reflect
 
 if TYPE_CHECKING:
     from botorch.models import SingleTaskGP
+
+    from sling2sim2real.identification.search import Evaluate
 
 FIT_STEPS = 10  # of L-BFGS on the hyperparameters, which start where the last round's ended
 CANDIDATES = 512  # from which a batch is put together, half of them near the best points
@@ -27,10 +28,17 @@ SAMPLES = 128  # of the posterior, quasi-random
 POLISH_STEPS = 20  # of L-BFGS on the whole batch
 
 
-class Bayes:
-    """Optimiser that asks each round for `population` points, chosen together.
-
-    The choice is by qLogExpectedImprovement.
+def bayesian(
+    evaluate: Evaluate,
+    dimension: int,
+    *,
+    rollouts: int,
+    seed: int,
+    population: int,
+    points: int = 400,
+    batch: int | None = None,
+) -> None:
+    """Latin hypercube, then batches of points chosen by qLogExpectedImprovement.
 
     The model is a SingleTaskGP with BoTorch's priors (Hvarfner et al. 2024) and an exponential
     kernel (Matern 1/2), a length scale an axis: losses are means of norms, whose valley is a kink,
@@ -42,71 +50,62 @@ class Bayes:
     each next one by what it adds to the expected improvement of those before, and then moves as a
     whole up the gradient of the acquisition function.
 
-    Of more than `points` evaluations the process sees the best half of that many and, of the
-    others, the latest: exact inference costs their number cubed.
+    Args:
+        points: Of more evaluations the process sees the best half of that many and, of the others,
+            the latest: exact inference costs their number cubed.
+        batch: Points of a round; None: `population`, as many as the hypercube has.
+
+    Raises:
+        ValueError: `points` is no whole number above 1.
     """
+    if not (isinstance(points, int) and points > 1):
+        raise ValueError(f"points must be a whole number above 1, got {points}")
+    unit = latin_hypercube(dimension, population, seed)
+    losses, process, number = evaluate(unit), Process(), 0
+    while True:
+        number += 1
+        rows = training_rows(losses, points)
+        chosen = process.batch(
+            unit[rows], -standardised(losses[rows]), batch or population, [seed, number]
+        )
+        unit, losses = np.concatenate([unit, chosen]), np.append(losses, evaluate(chosen))
 
-    phase = "bo"
 
-    def __init__(
-        self, dimension: int, *, rollouts: int, seed: int, population: int, points: int = 400
-    ) -> None:
-        """Start with the Latin hypercube; the budget `rollouts` changes nothing here.
+class Process:
+    """BoTorch's Gaussian process; each fit of its hyperparameters starts where the last ended."""
 
-        Raises ValueError if `points` is no whole number above 1.
-        """
-        if not (isinstance(points, int) and points > 1):
-            raise ValueError(f"points must be a whole number above 1, got {points}")
-        self._asked = latin_hypercube(dimension, population, seed)
-        self._population, self._seed, self._points = population, seed, points
-        self._unit, self._loss = np.zeros((0, dimension)), np.zeros(0)
-        self._round = 0
-        self._hyperparameters = None  # those of the last round
+    def __init__(self) -> None:
+        self._hyperparameters = None
 
-    def ask(self) -> np.ndarray:
-        """The Latin hypercube, then the batch of a round, shape (population, D)."""
-        if self._round:
-            with one_thread(), warnings.catch_warnings(record=True):  # BoTorch turns some on itself
-                # It warns that an optimisation ends early, as ours mean to, and of close points.
-                warnings.simplefilter("ignore")
-                self._asked = self._batch()
-        return self._asked
-
-    def tell(self, losses: np.ndarray) -> None:
-        """Finite losses of the points that were asked for last, shape (population,)."""
-        self._unit = np.concatenate([self._unit, self._asked])
-        self._loss = np.concatenate([self._loss, losses])
-        self._round += 1
-
-    def _batch(self) -> np.ndarray:
+    def batch(self, unit: np.ndarray, value: np.ndarray, count: int, seed: list[int]) -> np.ndarray:
+        """The next `count` points, shape (count, D), by values (N,) at points (N, D)."""
         import torch
         from botorch.acquisition.logei import qLogExpectedImprovement
         from botorch.generation import gen_candidates_scipy
         from botorch.sampling.normal import SobolQMCNormalSampler
 
-        rows = training_rows(self._loss, self._points)
-        unit, value = self._unit[rows], -standardised(self._loss[rows])
-        model, best = self._fitted(unit, value), value.max()
-        candidates = self._candidates(unit[np.argsort(-value, kind="stable")])
-        rng = np.random.default_rng([self._seed, self._round, 1])
-        first, second = (
-            SobolQMCNormalSampler(torch.Size([SAMPLES]), seed=int(seed))
-            for seed in rng.integers(2**31, size=2)
-        )
-        with torch.no_grad():
-            samples = first(model.posterior(torch.from_numpy(candidates)))[..., 0]
-        start = candidates[greedy(samples.numpy(), best, self._population)]
-        batch, _ = gen_candidates_scipy(
-            torch.from_numpy(start)[None],
-            qLogExpectedImprovement(model, best, second),
-            lower_bounds=0.0,
-            upper_bounds=1.0,
-            options={"maxiter": POLISH_STEPS},
-        )
+        with one_thread(), warnings.catch_warnings(record=True):  # BoTorch turns some on itself
+            # It warns that an optimisation ends early, as ours mean to, and of close points.
+            warnings.simplefilter("ignore")
+            model, best = self._fitted(unit, value), value.max()
+            candidates = _candidates(unit[np.argsort(-value, kind="stable")], seed)
+            first, second = (
+                SobolQMCNormalSampler(torch.Size([SAMPLES]), seed=int(number))
+                for number in np.random.default_rng([*seed, 1]).integers(2**31, size=2)
+            )
+            with torch.no_grad():
+                samples = first(model.posterior(torch.from_numpy(candidates)))[..., 0]
+            start = candidates[greedy(samples.numpy(), best, count)]
+            batch, _ = gen_candidates_scipy(
+                torch.from_numpy(start)[None],
+                qLogExpectedImprovement(model, best, second),
+                lower_bounds=0.0,
+                upper_bounds=1.0,
+                options={"maxiter": POLISH_STEPS},
+            )
         return batch[0].numpy().clip(0, 1)
 
     def _fitted(self, unit: np.ndarray, value: np.ndarray) -> SingleTaskGP:
-        """BoTorch's model of values (N,) at points (N, D); the fit starts where the last ended."""
         import torch
         from botorch.models import SingleTaskGP
         from botorch.models.utils.gpytorch_modules import get_covar_module_with_dim_scaled_prior
@@ -124,14 +123,15 @@ class Bayes:
         self._hyperparameters = model.state_dict()
         return model.eval()
 
-    def _candidates(self, best: np.ndarray) -> np.ndarray:
-        """Half from a Sobol sequence, half near the first of `best`, at all scales."""
-        rng = np.random.default_rng([self._seed, self._round])
-        dimension, half = best.shape[1], CANDIDATES // 2
-        everywhere = qmc.Sobol(dimension, rng=rng).random(half)
-        scale = 10 ** rng.uniform(-2.3, -0.3, (half, 1))
-        centre = best[rng.integers(min(NEAR, len(best)), size=half)]
-        return np.concatenate([everywhere, reflect(centre + scale * rng.normal(size=centre.shape))])
+
+def _candidates(best: np.ndarray, seed: list[int]) -> np.ndarray:
+    """Half from a Sobol sequence, half near the first of `best`, at all scales."""
+    rng = np.random.default_rng(seed)
+    dimension, half = best.shape[1], CANDIDATES // 2
+    everywhere = qmc.Sobol(dimension, rng=rng).random(half)
+    scale = 10 ** rng.uniform(-2.3, -0.3, (half, 1))
+    centre = best[rng.integers(min(NEAR, len(best)), size=half)]
+    return np.concatenate([everywhere, reflect(centre + scale * rng.normal(size=centre.shape))])
 
 
 def training_rows(loss: np.ndarray, points: int) -> np.ndarray:

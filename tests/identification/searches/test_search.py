@@ -1,5 +1,6 @@
-"""The loop around optimisers, and the whole chain, on functions with known minima."""
+"""Searches by name and to their budget, and the whole chain, on functions with known minima."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -8,22 +9,22 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.params import load
+from pipeline.params import Params, load
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.identification.objective.box import SearchBox
-from sling2sim2real.identification.search.build import build
-from sling2sim2real.identification.search.evaluations import Evaluations, theta_content
-from sling2sim2real.identification.search.explore import rollouts_of
-from sling2sim2real.identification.search.loop import latin_hypercube, search
-from tests.identification.search import functions
-from tests.identification.search.functions import (
+from sling2sim2real.identification.evaluations import Evaluations, theta_content
+from sling2sim2real.identification.objective.box import SearchBox, latin_hypercube
+from sling2sim2real.identification.search import explore, rollouts_of, run
+from tests.identification.searches import functions
+from tests.identification.searches.functions import (
     CENTRE,
     NAMES,
     Evaluate,
     alone,
     chain,
     changed,
+    cube,
     quadratic,
+    rosenbrock,
 )
 from tests.project import DEFAULTS
 
@@ -61,7 +62,7 @@ def test_a_box_that_fails_everywhere_is_searched_to_the_end() -> None:
     evaluate = quadratic(CENTRE, np.eye(5), fails=lambda unit: unit[:, 0] >= 0)
     for name in (
         "de",
-        "tests.identification.search.own:RandomSearch",
+        "tests.identification.searches.own:random_search",
     ):  # which looks at what it gets
         evaluations = alone(name, evaluate, 312)
         assert np.isinf(evaluations.total).all()
@@ -72,27 +73,29 @@ def test_a_box_that_fails_everywhere_is_searched_to_the_end() -> None:
 class Recorder:
     """Asks for batches of sizes that were given, and keeps the losses that it gets."""
 
-    phase = "recorder"
-
     def __init__(self, *sizes: int) -> None:
-        self._sizes, self.summary = iter(sizes), []
+        self._sizes, self.got = sizes, []
 
-    def ask(self) -> np.ndarray:
-        return np.full((next(self._sizes), 5), 0.5)
+    def __call__(self, evaluate) -> None:
+        for size in self._sizes:
+            self.got.append(evaluate(np.full((size, 5), 0.5)))
 
-    def tell(self, losses: np.ndarray) -> None:
-        self.summary.append(losses)
+
+def recorded(recorder, evaluate, rollouts: int) -> Evaluations:
+    evaluations = Evaluations("toy", NAMES)
+    run(recorder, evaluate, evaluations, phase="toy", rollouts=rollouts, box=cube(NAMES))
+    return evaluations
 
 
 @given(sizes=st.lists(st.integers(1, 9), min_size=1, max_size=9), data=st.data())
 def test_exactly_the_budget_is_spent(sizes: list[int], data: st.DataObject) -> None:
-    """Whatever sizes are asked for; the losses of the batch that is cut are not given."""
+    """Whatever sizes are asked for; a search does not see the losses of its last batch."""
     rollouts = data.draw(st.integers(1, sum(sizes)))
-    recorder, evaluations = Recorder(*sizes), Evaluations("toy", NAMES)
-    search(recorder, quadratic(CENTRE, np.eye(5)), evaluations, rollouts=rollouts)
+    recorder = Recorder(*sizes)
+    evaluations = recorded(recorder, quadratic(CENTRE, np.eye(5)), rollouts)
     assert len(evaluations.total) == rollouts
-    whole = [size for size, end in zip(sizes, np.cumsum(sizes), strict=True) if end <= rollouts]
-    assert [len(losses) for losses in recorder.summary] == whole
+    whole = [size for size, end in zip(sizes, np.cumsum(sizes), strict=True) if end < rollouts]
+    assert [len(losses) for losses in recorder.got] == whole
     generation = np.repeat(np.arange(len(sizes)), sizes)[:rollouts]
     assert evaluations.table["generation"].to_pylist() == generation.tolist()
 
@@ -101,12 +104,8 @@ def test_failed_points_are_told_as_twice_the_worst_so_far() -> None:
     values = iter([np.array([1.0, np.inf, 3.0]), np.array([2.0, np.inf]), np.array([4.0, np.inf])])
     evaluate = Evaluate(lambda unit: next(values), fails=lambda unit: np.arange(len(unit)) == 1)
     recorder = Recorder(3, 2, 2)
-    search(recorder, evaluate, Evaluations("toy", NAMES), rollouts=7)
-    assert [losses.tolist() for losses in recorder.summary] == [
-        [1.0, 6.0, 3.0],
-        [2.0, 6.0],
-        [4.0, 8.0],
-    ]
+    recorded(recorder, evaluate, 8)
+    assert [losses.tolist() for losses in recorder.got] == [[1.0, 6.0, 3.0], [2.0, 6.0], [4.0, 8.0]]
 
 
 def test_fixed_axes_keep_their_physical_values() -> None:
@@ -117,9 +116,7 @@ def test_fixed_axes_keep_their_physical_values() -> None:
     assert box.free == ("youngs_modulus", "dynamic_friction", "damping_scale")
     evaluate = quadratic(CENTRE, np.eye(5))
     evaluate.box = box
-    evaluations = Evaluations("toy", box.names)
-    optimizer = build("de", 3, rollouts=600, seed=1, population=20)
-    search(optimizer, evaluate, evaluations, rollouts=600, box=box)
+    evaluations = alone("de", evaluate, 600, changed(population=20), box=box)
     np.testing.assert_allclose(evaluations.table["poissons_ratio"], 0.45, rtol=1e-12)
     np.testing.assert_allclose(evaluations.table["elasticity_damping"], 5e-3, rtol=1e-12)
     best = [evaluations.best_row()[f"unit_{name}"] for name in box.free]
@@ -155,7 +152,7 @@ def test_an_optimiser_is_deterministic_and_spends_its_budget(torch_threads) -> N
 
     It starts, if it is ours, from the common Latin hypercube.
     """
-    for name in ("de", "bo", "adam", "tests.identification.search.own:RandomSearch"):
+    for name in ("de", "bo", "adam", "tests.identification.searches.own:random_search"):
         runs = []
         for number, seed in enumerate((1, 1, 2)):
             np.random.seed(number), torch.manual_seed(number), torch_threads(1 + number)
@@ -204,3 +201,77 @@ def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
         assert (content["band"], content["method"]) == ("band1", "toy")
         assert content["found"]["phase"] == phase
         assert content["confidence"] is None
+
+
+OWN = "tests.identification.searches.own"
+REFUSED = (
+    ("nowhere.at_all:f", {}, "(ModuleNotFoundError: No module named 'nowhere')"),
+    (f"{OWN}:absent", {}, "cannot be imported (AttributeError: module 'tests."),
+    ("tests.identification.searches.broken:f", {}, "cannot be imported (ZeroDivisionError: divis"),
+    (f"{OWN}:choosy", {"name": "y"}, "take its settings: no such name, sorry: y"),
+    (
+        f"{OWN}:outside",
+        {},
+        "evaluate() takes points of the unit cube, shape (N, 5), and got coordi",
+    ),
+    (f"{OWN}:flat", {"batch": 1}, "shape (N, 4), and got shape (1, 5)"),
+    (f"{OWN}:words", {}, "and got no array of numbers"),
+    ("math:hypot", {}, "cannot be called as function(evaluate, dimension, rollouts, seed"),
+    (f"{OWN}:random_search", {"rate": 1.0}, "got an unexpected keyword argument 'rate'"),
+    ("de", {"dimension": 3}, "multiple values for argument 'dimension'"),
+    ("de", {"mutation": 7.0}, "does not take its settings: "),
+    ("bo", {"points": 1}, "points must be a whole number above 1, got 1"),
+    ("adam", {"step": 0.0}, "rate and step must be above 0"),
+)
+
+
+def with_search(name: str, **more):
+    params = Params.parse(DEFAULTS.read_text(encoding="utf-8"))
+    method = params.methods["real2sim2real"].model_copy(update={"search": name, **more})
+    return params.model_copy(update={"methods": {"mine": method}})
+
+
+@pytest.mark.parametrize(("name", "settings", "expected"), REFUSED)
+def test_what_is_no_search_is_refused_in_one_line(name, settings, expected) -> None:
+    fixed = {"poissons_ratio": 0.45} if "4)" in expected else {}
+    params = with_search(name, settings=settings, fixed=fixed)
+    with pytest.raises(UserError) as error:
+        explore(params, "mine", Evaluate(rosenbrock))
+    message = str(error.value)
+    assert expected in message and message.startswith("search ") and "\n" not in message
+    assert "evaluate()" in message or "`search` under `methods` in params.yaml" in message
+
+
+def test_a_function_of_ones_own_gets_its_settings_and_names_its_rows() -> None:
+    params = with_search(f"{OWN}:random_search", settings={"batch": 3}, fixed={})
+    table = explore(params, "mine", Evaluate(rosenbrock)).table
+    assert set(table["phase"].to_pylist()) == {"random_search"}
+    assert table["generation"].to_pylist()[:4] == [0, 0, 0, 1] and len(table) == 600
+
+
+def test_a_function_that_catches_everything_ends_all_the_same() -> None:
+    assert len(alone(f"{OWN}:stubborn", Evaluate(rosenbrock), 40).total) == 40
+
+
+def test_a_multistart_explores_as_differential_evolution_does_and_moves_as_params_say() -> None:
+    params = with_search("de", fixed={})
+    budget = params.optimizer.model_copy(update={"cma_rollouts": 0})
+    seen = [
+        explore(params.model_copy(update={"optimizer": optimizer}), "mine", Evaluate(rosenbrock))
+        for params, optimizer in (
+            (params, budget),
+            (with_search("multistart", fixed={}), params.optimizer),
+            (params, budget.model_copy(update={"recombination": 0.0, "mutation": (0.0, 0.1)})),
+        )
+    ]
+    np.testing.assert_array_equal(seen[0].unit, seen[1].unit)
+    assert not np.array_equal(seen[0].unit, seen[2].unit)
+
+
+def test_a_function_beside_params_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By commands as well, which do not look where they are called."""
+    source = f"from {OWN} import random_search as mine\n"
+    (tmp_path / "beside_params.py").write_text(source)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.chdir(tmp_path)
+    assert len(alone("beside_params:mine", Evaluate(rosenbrock), 14).total) == 14

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.identification.search import regions as module
-from sling2sim2real.identification.search.regions import (
+from sling2sim2real.identification.searches import regions as module
+from sling2sim2real.identification.searches.regions import (
     Region,
     find_regions,
     isotropic,

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import norm
 
-from sling2sim2real.identification.optimizers.bo.bayes import greedy, standardised, training_rows
-from tests.identification.search.functions import (
+from sling2sim2real.identification.searches.bayesian import greedy, standardised, training_rows
+from tests.identification.searches.functions import (
     CENTRE,
     NAMES,
     Evaluate,
@@ -75,9 +75,9 @@ def test_it_is_silent_and_torch_waits_until_it_is_asked_for() -> None:
     """Though losses are all alike, points need a jitter, and climbs stop after a few steps."""
     code = """
 import sys, numpy as np
-import sling2sim2real.identification.optimizers.bo.bayes
-import sling2sim2real.identification.optimizers.adam.adam
-from tests.identification.search.functions import NAMES, Evaluate, alone, changed
+import sling2sim2real.identification.searches.bayesian
+import sling2sim2real.identification.searches.adam
+from tests.identification.searches.functions import NAMES, Evaluate, alone, changed
 
 assert not {"torch", "botorch"} & set(sys.modules)
 for function in (lambda unit: np.ones(len(unit)), lambda unit: (unit[:, 0] - 0.3) ** 2):

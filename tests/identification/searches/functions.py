@@ -1,18 +1,18 @@
 """Searches of known functions of the unit cube."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from types import SimpleNamespace
 
 import numpy as np
 
+from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluation
 from sling2sim2real.identification.objective.loss import TERMS
-from sling2sim2real.identification.optimizers.cma.multistart import Multistart
-from sling2sim2real.identification.search.build import build
-from sling2sim2real.identification.search.evaluations import Evaluations
-from sling2sim2real.identification.search.loop import search
-from sling2sim2real.identification.search.regions import Region, find_regions
+from sling2sim2real.identification.search import BudgetSpent, bound, function_of, run
+from sling2sim2real.identification.searches.cma_es import cma_es
+from sling2sim2real.identification.searches.regions import Region, find_regions
 
 NAMES = ("a", "b", "c", "d", "e")
 CENTRE = np.array([0.3, 0.62, 0.45, 0.8, 0.55])
@@ -30,6 +30,12 @@ BUDGET = SimpleNamespace(
 )
 
 
+def cube(names: tuple[str, ...]) -> SearchBox:
+    """0 to 10 an axis, all of them free."""
+    size = len(names)
+    return SearchBox(names, np.zeros(size), np.full(size, 10.0), np.zeros(size, bool))
+
+
 class Evaluate:
     """Evaluates a function of the unit cube, where each term of the loss is its value."""
 
@@ -41,9 +47,7 @@ class Evaluate:
         weights: dict[str, float] | None = None,
     ) -> None:
         self.function, self.fails, self.count = function, fails, 0
-        size = len(names)
-        low, high, linear = np.zeros(size), np.full(size, 10.0), np.zeros(size, bool)
-        self.box = SearchBox(names, low, high, linear)
+        self.box = cube(names)
         weights = dict.fromkeys(TERMS, 0.0) | (weights or {"geom": 1.0})
         weighed = [name for name in TERMS if weights[name]]
         total = lambda terms: sum(weights[name] * terms[name] for name in weighed)  # noqa: E731
@@ -94,17 +98,41 @@ def chain(evaluate, optimizer=BUDGET, names=NAMES) -> tuple[Evaluations, Evaluat
     sizes = {name: getattr(optimizer, name) for name in ("k_top", "k_nn", "delta")}
     regions = find_regions(explored.unit, explored.total, **sizes)
     refined = Evaluations("toy", explored.names)
-    several = Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed)
-    search(several, evaluate, refined, rollouts=second)
+    sizes = {"population": optimizer.cma_population, "seed": optimizer.seed}
+    search = lambda losses_of: cma_es(losses_of, regions, **sizes)  # noqa: E731
+    run(search, evaluate, refined, phase="cma", rollouts=second, box=cube(names))
     return explored, refined, regions
 
 
 def alone(
-    name: str, evaluate, rollouts: int, optimizer=BUDGET, names=NAMES, **settings
+    name: str, evaluate, rollouts: int, optimizer=BUDGET, names=NAMES, box=None, **settings
 ) -> Evaluations:
-    """The evaluations of a search of one phase by the optimiser of that name."""
-    evaluations = Evaluations("toy", names)
+    """The evaluations of a search of one phase by its name."""
+    box = box or cube(names)
+    evaluations = Evaluations("toy", box.names)
     settings |= {"seed": optimizer.seed, "population": optimizer.population}
-    algorithm = build(name, len(evaluations.names), rollouts=rollouts, **settings)
-    search(algorithm, evaluate, evaluations, rollouts=rollouts)
+    phase, function = function_of(name)
+    search = bound(function, name, len(box.free), rollouts=rollouts, **settings)
+    run(search, evaluate, evaluations, phase=phase, rollouts=rollouts, box=box)
     return evaluations
+
+
+def batches_of(
+    search: Callable[..., None],
+    function: Callable[[np.ndarray], np.ndarray],
+    dimension: int,
+    rollouts: int,
+    **settings,
+) -> list[np.ndarray]:
+    """Batches of points that a search evaluates, by the function's own losses."""
+    batches, settings = [], {"seed": 1, "population": 5} | settings
+
+    def evaluate(unit: np.ndarray, solver: np.ndarray | None = None) -> np.ndarray:
+        if sum(map(len, batches)) >= rollouts:
+            raise BudgetSpent
+        batches.append(np.array(unit))
+        return function(unit)
+
+    with suppress(BudgetSpent):
+        search(evaluate, dimension, rollouts=rollouts, **settings)
+    return batches

@@ -1,4 +1,6 @@
-"""Promising regions of a search: centres by non-maximum suppression, covariances of neighbours.
+"""Promising regions of a search: lines 3 and 4 of the paper's algorithm 1.
+
+Centres by non-maximum suppression (NMS), covariances of the evaluated neighbours.
 
 Distances are those of the unit cube; failed rows count for nothing.
 """

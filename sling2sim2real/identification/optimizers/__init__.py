@@ -1,1 +1,0 @@
-"""Optimisers behind ask and tell, a folder each."""

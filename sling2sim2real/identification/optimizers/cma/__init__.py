@@ -1,1 +1,0 @@
-"""CMA-ES in several regions."""

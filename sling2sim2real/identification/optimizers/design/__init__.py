@@ -1,1 +1,0 @@
-"""One design over the whole box."""

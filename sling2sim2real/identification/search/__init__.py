@@ -1,1 +1,0 @@
-"""Search for parameters: the loop, what it evaluated, regions and optimisers."""

@@ -1,0 +1,1 @@
+"""Searches of the unit cube, a file each: functions over `evaluate` (identification/search.py)."""

@@ -51,7 +51,7 @@ validate: setup       # slow campaigns, and tests by other engines and readers; 
 	.venv/bin/pip install --disable-pip-version-check -q -e '.[dev,validation]' -c constraints.txt
 	.venv/bin/sling verify
 	.venv/bin/python -m pytest tests/validation/engines tests/validation/benchmarks tests/exporting tests/recording/masks \
-		tests/recording/input/test_kinematics.py tests/cli/preflight/test_pictures.py \
+		tests/recording/test_kinematics.py tests/cli/preflight/test_pictures.py \
 		tests/rig/recorder/test_record.py
 	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation \
 		tests/recording/test_orange.py

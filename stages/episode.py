@@ -5,7 +5,7 @@
 Reads the recordings in data/raw/<band>/; writes data/episodes/<band>/<n>/ for each pull that they
 hold, n = 1, 2, ... by the recording's name, then by time: signals.parquet and clouds.parquet. A
 pull that cannot be used is left out, with a warning; a recording without any that can be used is an
-error. What the check of a recording has made on its way is taken, not made again.
+error.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import sys
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import replacing_folder
 from sling2sim2real.base.layout import Layout, NotMade
-from sling2sim2real.recording.input.bag import once
-from sling2sim2real.recording.stored import forget, load_or_build
+from sling2sim2real.recording.build import build_episodes
+from sling2sim2real.recording.files import once
 from stages.start import run, started
 
 
@@ -33,7 +33,7 @@ def main() -> None:
         )
     with replacing_folder(layout.episodes(band)) as folder:
         for path in recordings:
-            episodes, refused = load_or_build(path, band, params, layout)
+            episodes, refused = build_episodes(path, band, params)
             for reason in refused:
                 print(f"warning: left out: {reason}", file=sys.stderr)
             for episode in episodes:
@@ -46,7 +46,6 @@ def main() -> None:
                     f" {len(episode.clouds)} clouds",
                     flush=True,
                 )
-    forget(band, layout)
 
 
 if __name__ == "__main__":

@@ -37,7 +37,7 @@ EXTRAS = {
     "tests/examples/test_sam3_masks.py": "sam3",
     "tests/examples/tiny_sam3.py": "sam3",
     "tests/": "dev",
-    "tests/recording/input/test_kinematics.py": "validation",  # skipped where that is missing
+    "tests/recording/test_kinematics.py": "validation",  # skipped where that is missing
     "tests/recording/masks/": "validation",
     "tests/validation/": "validation",
     "tests/exporting/": "validation",

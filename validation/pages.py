@@ -15,7 +15,7 @@ from sling2sim2real.base import errors
 from sling2sim2real.base.code import ROOT
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_text
-from sling2sim2real.recording.checks.table import CHECKS
+from sling2sim2real.recording.checks import CHECKS
 from validation import headline
 from validation.benchmarks import times
 from validation.campaigns import ablations, field, landings
@@ -30,7 +30,7 @@ def checks() -> list[str]:
     heads = "check", "compares", "uncertainty", "warns", "refuses", "remedy"
     rows = [
         (f"`{check.name}`", *(getattr(check, head) or "–" for head in heads[1:]))
-        for check in CHECKS
+        for check in CHECKS.values()
     ]
     return [row(*cells) for cells in (heads, ("---",) * len(heads), *rows)]
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from sling2sim2real.base.layout import NotMade
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.recording.geometry import EpisodeGeometry
-from sling2sim2real.recording.input import images
-from sling2sim2real.recording.input.camera import Camera
-from sling2sim2real.recording.input.frames import Transform
-from sling2sim2real.recording.input.reader import read_recording
-from sling2sim2real.recording.input.readings import Picture
+from sling2sim2real.recording import images
+from sling2sim2real.recording.camera import Camera
+from sling2sim2real.recording.frames import EpisodeGeometry
+from sling2sim2real.recording.messages import Picture
+from sling2sim2real.recording.streams import read_recording
+from sling2sim2real.recording.transforms import Transform
 from sling2sim2real.settings.lab import SetupParams
 from sling2sim2real.settings.recording import DelayParams
 

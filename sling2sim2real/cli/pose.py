@@ -21,8 +21,8 @@ from sling2sim2real.cli.aim import Answer
 from sling2sim2real.cli.plan.hand import along_pull, quaternion
 from sling2sim2real.cli.safety import Hazard
 from sling2sim2real.episode.episode import read_metadata
-from sling2sim2real.recording.geometry import EpisodeGeometry
-from sling2sim2real.recording.input.frames import Transform
+from sling2sim2real.recording.frames import EpisodeGeometry
+from sling2sim2real.recording.transforms import Transform
 from stages.start import stage_of
 
 

@@ -23,8 +23,8 @@ from sling2sim2real.base.files import write_text
 from sling2sim2real.cli.arguments import MEASURED
 from sling2sim2real.cli.command_line import say
 from sling2sim2real.cli.params_file import edited
-from sling2sim2real.recording.input.frames import Transform
-from sling2sim2real.recording.loop import SURE, TOUCH, Loop
+from sling2sim2real.recording.frames import SURE, TOUCH, Loop
+from sling2sim2real.recording.transforms import Transform
 from sling2sim2real.settings.lab import SetupParams
 
 UPRIGHT = (0.0, 0.0, 1.0)

@@ -28,10 +28,10 @@ import numpy as np
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording.camera_delay import camera_delay
-from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.recording.events import Pull
+from sling2sim2real.recording.force import ToolInertia, estimate_tool_inertia
 from sling2sim2real.recording.release_pictures import ReleasePictures, release_pictures
 from sling2sim2real.recording.start_back import start_back
-from sling2sim2real.recording.tool_inertia import ToolInertia, estimate_tool_inertia
 from sling2sim2real.settings import Settings
 
 Found = TypeVar("Found")

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sling2sim2real.recording.processed import Processed
-from sling2sim2real.recording.tare import GRAVITY
-from sling2sim2real.recording.view import Scene
+from sling2sim2real.recording.force import GRAVITY
+from sling2sim2real.recording.scene import Scene
+from sling2sim2real.recording.signals import Signals
+from sling2sim2real.settings.lab import BandParams
 
 HAND_ERROR, GRIP_ERROR = 0.005, 0.005  # m: of the tool centre point; of the grip along the band
 FRAME_ERROR = np.deg2rad(0.5)  # of a sensor that is mounted and calibrated well
@@ -48,13 +49,13 @@ class Hold:
     weight_error: float
 
 
-def hold_of(done: Processed) -> Hold:
+def hold_of(signals: Signals, scene: Scene, band: BandParams, weighed: bool = True) -> Hold:
     """Measure the hold of a pull whose band is drawn at the release.
 
     A band that was not weighed weighs nothing, which its stiffness hardly feels.
     """
-    signals, scene, facts = done.signals, done.scene, done.signals.facts
-    half = (done.band.mass if done.weighed else 0.0) * GRAVITY / 2
+    facts = signals.facts
+    half = (band.mass if weighed else 0.0) * GRAVITY / 2
     hand = signals.hand(signals.release_time - 0.01)
     force = np.array(facts.hold_force) - half
     size = float(np.linalg.norm(force))
@@ -69,8 +70,9 @@ def hold_of(done: Processed) -> Hold:
     zero = np.hypot(facts.zero_error, _unsure(facts.zero_change, facts.zero_steady))
     spread += FRAME_ERROR**2 + (zero / size) ** 2
     spread += np.array([WEIGHT_ERROR * float(np.linalg.norm(half)) / size, 0.0]) ** 2
-    weight, weight_error = _weight(done, float(np.hypot(zero, CREEP * size)))
-    area = np.pi * done.band.diameter**2 / 4
+    mass = band.mass if weighed else None
+    weight, weight_error = _weight(signals, scene, mass, float(np.hypot(zero, CREEP * size)))
+    area = np.pi * band.diameter**2 / 4
     return Hold(
         size=size,
         lift=float(force @ up),
@@ -103,16 +105,17 @@ def _pull(scene: Scene, hand: np.ndarray, grip: float = 0.0) -> np.ndarray:
     return (stress / lengths) @ ways
 
 
-def _weight(done: Processed, zero: float) -> tuple[float | None, float]:
+def _weight(
+    signals: Signals, scene: Scene, mass: float | None, zero: float
+) -> tuple[float | None, float]:
     """How heavy the slack band is on the hand, over its whole weight, and the error of that."""
-    signals = done.signals
     times = signals.time
-    way = np.array([done.scene.stretch(time) for time in times])
+    way = np.array([scene.stretch(time) for time in times])
     slack = (times > signals.grasp_time + AFTER_GRASP) & (times < signals.release_time)
     slack &= way < SLACK
-    if slack.sum() < LEAST_SLACK or not done.weighed:
+    if slack.sum() < LEAST_SLACK or mass is None:
         return None, np.inf
-    heavy = done.band.mass * float(np.linalg.norm(GRAVITY))
+    heavy = mass * float(np.linalg.norm(GRAVITY))
     force = signals.force[slack, 2]
     error = np.hypot(zero, force.std() / np.sqrt(LEAST_SLACK))
     return float(-force.mean() / heavy), float(error / heavy)

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode import signal
-from sling2sim2real.recording.geometry import Geometry
-from sling2sim2real.recording.input.reader import Stream
+from sling2sim2real.recording.frames import Geometry
+from sling2sim2real.recording.streams import Stream
 
 VELOCITY_WINDOW = 0.05  # s of the local cubic fits that are differentiated once
 SPARSE = 20  # times longer than its messages at their usual rate would take

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.recording.events import Pull
 
 AROUND = 0.4  # s before and after the release
 THERE = 0.01  # m: while the hand is further from where it lets go, it dips or draws

@@ -10,12 +10,11 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode import signal
 from sling2sim2real.episode.phases import TURN
 from sling2sim2real.episode.window import Window, window_of
-from sling2sim2real.recording.geometry import turned
+from sling2sim2real.recording.events import Pull
+from sling2sim2real.recording.force import ToolInertia, band_force
+from sling2sim2real.recording.frames import turned
 from sling2sim2real.recording.grasp import MARGIN
 from sling2sim2real.recording.motion import Motion, expect_dense, interpolated
-from sling2sim2real.recording.pulls import Pull
-from sling2sim2real.recording.tare import band_force
-from sling2sim2real.recording.tool_inertia import ToolInertia
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import Tool
 from sling2sim2real.settings.recording import EpisodeParams
@@ -55,7 +54,6 @@ class SignalFacts:
         release_error, release_fall, release_resolution, release_spread: Of `Release` [s].
         filtered: A filter is between sensor and recording, by how the force falls.
         slips: Sudden drops of the held force before the release, since the window's start [s].
-        jumps: Those of the free hand before the grasp, that are not in `zeroed` [s].
     """
 
     bias: list[float]
@@ -77,7 +75,6 @@ class SignalFacts:
     release_spread: float
     filtered: bool
     slips: list[float]
-    jumps: list[float]
 
 
 @dataclass(frozen=True)
@@ -181,7 +178,6 @@ def signals_of(pull: Pull, params: Settings, inertia: ToolInertia | None = None)
             for time in release.slips
             if time >= grasp - MARGIN and not _lets_back(motion, time)
         ],
-        jumps=[time - start for time in release.slips if time < grasp - MARGIN],
     )
     return Signals(
         origin=recording.origin + round(start * 1e9),

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.recording.events import Pull
 
 REACH = 0.1  # s around the release in which the start is looked for
 SPAN = 0.02  # s over which the path's second difference is taken

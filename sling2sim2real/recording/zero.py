@@ -10,7 +10,7 @@ from scipy.signal import find_peaks
 from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.change import means, reach, sample_noise
+from sling2sim2real.recording.release import means, reach, sample_noise
 
 LEAST_STEP = 0.03  # of the largest sudden change: less may be a hand that starts or stops
 SIGMAS = 6.0  # of a mean: what is less sudden than this is noise

@@ -13,10 +13,10 @@ from sling2sim2real.base.layout import Layout, NotMade
 from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.camera_view import CameraView
 from sling2sim2real.card.simulated import Simulated, simulate
-from sling2sim2real.recording.geometry import EpisodeGeometry, geometry_of
-from sling2sim2real.recording.input.camera import Camera
-from sling2sim2real.recording.input.frames import Transform
-from sling2sim2real.recording.input.reader import read_recording
+from sling2sim2real.recording.camera import Camera
+from sling2sim2real.recording.frames import EpisodeGeometry, geometry_of
+from sling2sim2real.recording.streams import read_recording
+from sling2sim2real.recording.transforms import Transform
 from tests.card.conftest import BAND, METHOD, TRUTH
 from tests.recording.parts import split
 

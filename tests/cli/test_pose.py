@@ -16,8 +16,8 @@ from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli.plan.plan import plan_recording
 from sling2sim2real.cli.pose import posed
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.recording.geometry import EpisodeGeometry, geometry_of
-from sling2sim2real.recording.input.reader import read_recording
+from sling2sim2real.recording.frames import EpisodeGeometry, geometry_of
+from sling2sim2real.recording.streams import read_recording
 from tests.project import DEFAULTS, with_
 from validation.recordings.bag import write_bag
 

@@ -9,8 +9,11 @@ from PIL import Image
 
 from pipeline.params import Params, load
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.recording.build import Checked, episode_of, process
-from sling2sim2real.recording.masks.ridge import RidgeMask
+from sling2sim2real.recording.build import Processed, Whole, episode_of, process_recording
+from sling2sim2real.recording.events import Part, Pull
+from sling2sim2real.recording.frames import geometry_of
+from sling2sim2real.recording.mask import RidgeMask
+from sling2sim2real.recording.streams import Recording, read_recording
 from tests import once
 from tests.project import DEFAULTS, with_
 from validation.recordings.bag import Truth, write_bag
@@ -29,16 +32,46 @@ def seen(tmp_path_factory):
     return written(tmp_path_factory, "seen.mcap")
 
 
+def processed_of(path: Path, params: Params) -> Processed:
+    """The first pull of a recording that can be used. Raises UserError."""
+    return process_recording(path, params.bands["band1"], params)[0][0]
+
+
+def whole_of(path: Path, params: Params) -> Whole:
+    """All of it. Raises UserError."""
+    whole = processed_of(path, params).whole
+    assert whole
+    return whole
+
+
+def part_of(recording: Recording, params: Params) -> Part:
+    """All of it as one pull."""
+    return Part(recording, geometry_of(recording, params.setup))
+
+
+def pull_of(recording: Path | Recording, params: Params) -> Pull:
+    """With its events. Raises UserError."""
+    if isinstance(recording, Path):
+        recording = read_recording(recording, params.setup)
+    return Pull.of(part_of(recording, params))
+
+
 @pytest.fixture(scope="session")
-def checked(seen, params) -> Checked:
+def processed(seen, params) -> Processed:
     """`seen`, worked out once; to be read only."""
-    return process(seen[0], params.bands["band1"], params)
+    return processed_of(seen[0], params)
 
 
 @pytest.fixture(scope="session")
-def episode(checked, params) -> Episode:
+def checked(processed) -> Whole:
+    """All of it; to be read only."""
+    return processed.whole
+
+
+@pytest.fixture(scope="session")
+def episode(processed) -> Episode:
     """Of `seen`; to be read only."""
-    return episode_of(checked, "band1", params)
+    return episode_of(processed, "band1")
 
 
 @pytest.fixture(scope="session")
@@ -48,7 +81,7 @@ def masked(seen, params, tmp_path_factory) -> Path:
     def make(folder: Path) -> None:
         shutil.copy(seen[0], folder / "masked.mcap")
         (folder / "masked.masks").mkdir()
-        view = process(seen[0], params.bands["band1"], params).view
+        view = whole_of(seen[0], params).view
         ridge = RidgeMask(view)
         for number, frame in view.frames():
             whole = np.zeros(view.depth(number).shape, np.uint8)
@@ -71,3 +104,8 @@ def written(factory: pytest.TempPathFactory, name: str, **options) -> tuple[Path
         return folder / name, write_bag(folder / name, **options)
 
     return once.value(factory, name, make)
+
+
+@pytest.fixture(scope="session")
+def whole(blind) -> Path:
+    return blind[0]

@@ -11,9 +11,9 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sling2sim2real.recording.geometry import Geometry
-from sling2sim2real.recording.input.frames import Transform
-from sling2sim2real.recording.input.reader import Stream
+from sling2sim2real.recording.frames import Geometry
+from sling2sim2real.recording.streams import Stream
+from sling2sim2real.recording.transforms import Transform
 from validation.recordings.bag import BASE, HAND, SENSOR, START, Truth
 
 GRAVITY = np.array([0, 0, -9.81])

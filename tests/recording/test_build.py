@@ -9,16 +9,16 @@ import pytest
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.recording.build import build_episodes, episode_of, process, process_pull
-from sling2sim2real.recording.input.reader import read_recording
-from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.recording.build import build_episodes, episode_of, process
 from sling2sim2real.recording.signals import signals_of
+from sling2sim2real.recording.streams import read_recording
 from tests.project import with_
+from tests.recording.conftest import part_of, processed_of, pull_of
 from validation.recordings.bag import EYE, Truth, blind_bag, edit, scores
 
 
 def signals(path, params):
-    return signals_of(Pull.of(read_recording(path, params.setup), params.setup), params)
+    return signals_of(pull_of(path, params), params)
 
 
 def test_force_and_motion(episode, seen) -> None:
@@ -62,7 +62,7 @@ def test_clouds_lie_on_the_band_and_cover_it(episode, seen) -> None:
 def test_recordings_that_cannot_be_used(tmp_path, params, truth, words) -> None:
     path = blind_bag(tmp_path, truth)
     with pytest.raises(UserError, match=words) as caught:
-        process(path, params.bands["band1"], params)
+        processed_of(path, params)
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
 
 
@@ -95,10 +95,10 @@ def test_bytes_are_reproducible_and_come_back(episode, seen, params, tmp_path) -
 
 def test_a_late_camera_is_put_right_and_it_is_said(episode, seen, params) -> None:
     recording = read_recording(seen[0], params.setup).shifted(camera=-0.015)
-    done = process_pull(Pull.of(recording, params.setup), params.bands["band1"], params)
-    late = episode_of(done, "band1", params).metadata["preprocessing"]["delays"]
+    done = process(part_of(recording, params), params.bands["band1"], params)
+    late = episode_of(done, "band1").metadata["preprocessing"]["delays"]
     assert late["camera"]["applied"] and late["camera"]["source"] == "estimated"
     assert late["camera"]["value"] == pytest.approx(0.015, abs=1e-3)
     assert not late["pose"]["applied"] and 0 < late["pose"]["left"] < 0.002
     assert late["camera"]["against"] == "pose"
-    np.testing.assert_allclose(done.clouds.time, episode.cloud_time, atol=1e-3)
+    np.testing.assert_allclose(done.whole.clouds.time, episode.cloud_time, atol=1e-3)

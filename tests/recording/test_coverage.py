@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sling2sim2real.recording.checks.pictures import of_coverage
-from sling2sim2real.recording.coverage import by_phase, over_time, share_covered, share_off_plane
+from sling2sim2real.recording.clouds import by_phase, over_time, share_covered, share_off_plane
+from tests.recording.made import of_pictures
 
 
 def test_points_of_the_arm_in_the_hanging_band_are_said(checked, params) -> None:
     """Points 5 cm towards the hand, off the upright plane through the tips, in one picture."""
-    assert "off_plane" not in {finding.about for finding in of_coverage(checked.coverage)}
+    assert "off_plane" not in {finding.about for finding in of_pictures(checked)}
     clouds = checked.clouds
     arm = np.array([[0.0, -0.05, -0.2]], np.float32).repeat(len(clouds.points[1]) // 20, 0)
     points = [*clouds.points]
@@ -20,7 +20,11 @@ def test_points_of_the_arm_in_the_hanging_band_are_said(checked, params) -> None
     rows = over_time(checked.scene, replace(clouds, points=points), 0.0)
     assert rows[1].phase == "hanging" and rows[1].off_plane == pytest.approx(0.05, abs=0.01)
     assert all(row.off_plane in (None, 0.0) for row in (rows[0], *rows[2:]))
-    (message,) = [finding.what for finding in of_coverage(rows) if finding.about == "off_plane"]
+    (message,) = [
+        finding.what
+        for finding in of_pictures(replace(checked, coverage=rows))
+        if finding.about == "off_plane"
+    ]
     summary = sum(row.off_plane is not None for row in rows)
     assert message.startswith(
         f"1 of {summary} pictures of the hanging band hold points off the plane"

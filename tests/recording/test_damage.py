@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording.build import build_episodes
-from sling2sim2real.recording.input.reader import read_recording
+from sling2sim2real.recording.streams import read_recording
 from tests import once
 from tests.recording.test_foxglove import assert_same_episode
 from validation.recordings.small import CONTAINERS, FAMILIES, small_params, write_small

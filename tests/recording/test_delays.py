@@ -11,17 +11,23 @@ import pytest
 from sling2sim2real.recording import delays
 from sling2sim2real.recording.camera_delay import camera_delay
 from sling2sim2real.recording.delays import Estimate, correct_delays
-from sling2sim2real.recording.geometry import geometry_of
-from sling2sim2real.recording.input.reader import read_recording
-from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.recording.events import Part, Pull
+from sling2sim2real.recording.force import ToolInertia, estimate_tool_inertia
+from sling2sim2real.recording.frames import geometry_of
 from sling2sim2real.recording.release_pictures import ReleasePictures
-from sling2sim2real.recording.tool_inertia import ToolInertia, estimate_tool_inertia
+from sling2sim2real.recording.streams import read_recording
 from tests.project import with_
+from tests.recording.conftest import pull_of
 from tests.recording.played import Played
 from validation.recordings.bag import Truth
 
 SLOW = Truth(grasp=0.9, lifted=1.4, drawn=2.8, release=3.4, end=4.6)
 INJECTED = (-0.02, 0.0, 0.005, 0.015)  # s
+
+
+def pulled(*given) -> Pull:
+    """Of a recording and its geometry, as if it were one pull."""
+    return Pull.of(Part(*given))
 
 
 def late(recording, role: str, seconds: float):
@@ -53,7 +59,7 @@ def test_the_poses_delay_is_found_by_the_tools_inertia(heavy, noise) -> None:
         shaken = np.random.default_rng(seed).normal(0, noise, wrench.values.shape)
         changed = replaced(recording, wrench=replace(wrench, values=wrench.values + shaken))
         seconds = INJECTED[seed % 4]
-        inertia = estimate_tool_inertia(Pull(late(changed, "pose", seconds), geometry), None)
+        inertia = estimate_tool_inertia(pulled(late(changed, "pose", seconds), geometry), None)
         off.append(inertia.delay - seconds)
         errors.append(inertia.delay_error)
         assert inertia.mass == pytest.approx(0.7, abs=5 * inertia.mass_error)
@@ -73,7 +79,7 @@ def test_a_slow_pose_that_loses_messages_makes_no_delay_up(heavy, share) -> None
         fewer = replace(pose, stamp=pose.stamp[keep], values=pose.values[keep])
         changed = replaced(recording, pose=fewer)
         inertia = estimate_tool_inertia(
-            Pull(late(changed, "pose", INJECTED[seed % 4]), geometry), None
+            pulled(late(changed, "pose", INJECTED[seed % 4]), geometry), None
         )
         if inertia is None:
             continue
@@ -85,7 +91,7 @@ def test_a_force_that_does_not_feel_the_tool_says_nothing_of_the_pose() -> None:
     played = Played(mass=0.0, truth=SLOW)
     for seconds in INJECTED:
         recording = late(played.recording(), "pose", seconds)
-        assert estimate_tool_inertia(Pull(recording, played.geometry()), None) is None
+        assert estimate_tool_inertia(pulled(recording, played.geometry()), None) is None
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +104,7 @@ def looked_at(seen, params):
 def test_the_cameras_delay_is_found_by_the_hand_in_its_pictures(looked_at, params, seconds) -> None:
     recording, geometry = looked_at
     changed = late(late(recording, "depth", seconds), "color", seconds)
-    estimate = correct_delays(Pull(changed, geometry), params)[1].camera
+    estimate = correct_delays(pulled(changed, geometry), params)[1].camera
     assert estimate.against == "pose" and estimate.left < 0.001
     assert abs(estimate.value - seconds) <= 0.001
 
@@ -107,29 +113,29 @@ def test_wrong_extrinsics_are_no_delay(looked_at) -> None:
     """A camera that is 3 mm and half a degree elsewhere."""
     from scipy.spatial.transform import Rotation
 
-    from sling2sim2real.recording.input.frames import Transform
+    from sling2sim2real.recording.transforms import Transform
 
     recording, geometry = looked_at
     off = Transform(Rotation.from_rotvec([0.006, -0.004, 0.005]), np.array([0.002, 0.002, -0.001]))
-    value, _ = camera_delay(Pull(recording, replace(geometry, camera=off @ geometry.camera)))
+    value, _ = camera_delay(pulled(recording, replace(geometry, camera=off @ geometry.camera)))
     assert abs(value) <= 0.0015
 
 
 def test_black_pictures_say_nothing(blind, params) -> None:
     recording = read_recording(blind[0], params.setup)
-    assert camera_delay(Pull.of(recording, params.setup)) is None
+    assert camera_delay(pull_of(recording, params)) is None
 
 
 def test_what_is_applied(looked_at, params) -> None:
     recording, geometry = looked_at
-    pull = Pull(recording, geometry)
+    pull = pulled(recording, geometry)
     right, estimates = correct_delays(pull, params)
     assert abs(estimates.pose.value) < 0.001 and not estimates.pose.applied  # the hand starts back
     assert abs(estimates.camera.value) < 0.001 and estimates.camera.applied
     off = (right.recording.depth.stamp - recording.depth.stamp) * 1e-9
     np.testing.assert_allclose(off, -estimates.camera.value, atol=1e-9)
 
-    right, estimates = correct_delays(Pull(late(recording, "depth", 0.015), geometry), params)
+    right, estimates = correct_delays(pulled(late(recording, "depth", 0.015), geometry), params)
     assert estimates.camera.applied and estimates.camera.value == pytest.approx(0.015, abs=0.001)
     right = right.recording
     np.testing.assert_allclose((right.depth.stamp - recording.depth.stamp) * 1e-9, 0, atol=1e-3)
@@ -140,7 +146,7 @@ def test_a_late_force_is_a_pose_that_is_early(looked_at, params, seconds) -> Non
     """The hand starts back before the force falls: both pose and camera are put right."""
     recording, geometry = looked_at
     changed = replace(late(recording, "wrench", seconds), start=recording.origin)
-    _, estimates = correct_delays(Pull(changed, geometry), params)
+    _, estimates = correct_delays(pulled(changed, geometry), params)
     assert estimates.pose.applied and estimates.pose.value == pytest.approx(-seconds, abs=0.002)
     assert estimates.pose.left < 0.002 and not estimates.conflict
 
@@ -151,7 +157,7 @@ def test_two_estimates_are_weighed_or_said(looked_at, params, monkeypatch, back,
     tool = ToolInertia(1.0, 0.01, 0.0, 0.001)
     monkeypatch.setattr(delays, "estimate_tool_inertia", lambda *_: tool)
     monkeypatch.setattr(delays, "start_back", lambda _: (back, 0.001))
-    estimates = correct_delays(Pull(*looked_at), params)[1]
+    estimates = correct_delays(pulled(*looked_at), params)[1]
     assert bool(estimates.conflict) == conflict and not estimates.pose.applied
     assert estimates.pose.value == pytest.approx(0.0 if conflict else back / 2)
     assert estimates.pose.error == pytest.approx(0.001 if conflict else 0.001 / np.sqrt(2))
@@ -166,7 +172,7 @@ def test_given_delays_that_are_right_are_kept(looked_at, params) -> None:
     recording, geometry = looked_at
     changed = late(late(recording, "pose", -0.012), "depth", 0.3)
     summary = given(params, pose=-0.012, camera=0.3)
-    right, estimates = correct_delays(Pull(late(changed, "color", 0.3), geometry), summary)
+    right, estimates = correct_delays(pulled(late(changed, "color", 0.3), geometry), summary)
     assert (estimates.pose.value, estimates.camera.value) == (-0.012, 0.3)
     assert estimates.pose.source == estimates.camera.source == "setup" and not estimates.conflict
     assert 0 < estimates.pose.left < 0.003 and 0 < estimates.camera.left < 0.002
@@ -178,7 +184,7 @@ def test_a_given_delay_that_the_recording_does_not_show(looked_at, params, monke
     """It has the error of a given number, and is taken off."""
     for name in ("camera_delay", "start_back", "release_pictures"):
         monkeypatch.setattr(delays, name, lambda *_: None)
-    _, estimates = correct_delays(Pull(*looked_at), given(params, pose=-0.004, camera=0.0))
+    _, estimates = correct_delays(pulled(*looked_at), given(params, pose=-0.004, camera=0.0))
     assert estimates.pose == Estimate(-0.004, 0.002, "setup", True, 0.002, given=-0.004)
     assert estimates.camera == Estimate(0.0, 0.005, "setup", False, 0.005, given=0.0)
 
@@ -187,7 +193,7 @@ def test_a_given_delay_that_the_recording_does_not_show(looked_at, params, monke
 def test_a_given_delay_that_is_wrong_is_put_right(looked_at, params, summary) -> None:
     """The camera is 12 ms late, whatever was given."""
     recording, geometry = looked_at
-    pull = Pull(late(late(recording, "depth", 0.012), "color", 0.012), geometry)
+    pull = pulled(late(late(recording, "depth", 0.012), "color", 0.012), geometry)
     right, estimates = correct_delays(pull, given(params, camera=summary))
     assert estimates.camera.value == pytest.approx(0.012, abs=0.001) and estimates.camera.applied
     assert estimates.camera.rest == pytest.approx(0.012 - summary, abs=0.001)
@@ -198,7 +204,7 @@ def test_a_given_delay_that_is_wrong_is_put_right(looked_at, params, summary) ->
 
 def test_a_given_delay_tells_a_clock_from_the_robots_own_motion(looked_at, params) -> None:
     recording, geometry = looked_at
-    early = Pull(late(recording, "pose", 0.02), geometry)
+    early = pulled(late(recording, "pose", 0.02), geometry)
     _, estimates = correct_delays(early, given(params, pose=0.0))
     assert estimates.pose.value == 0.0 and estimates.pose.left == 0.002
     assert "moves by itself" in estimates.conflict
@@ -237,7 +243,7 @@ def test_the_camera_tells_a_late_pose_from_a_late_start(
     monkeypatch.setattr(delays, "start_back", lambda _: (0.02, 0.001))
     monkeypatch.setattr(delays, "camera_delay", by_hand)
     monkeypatch.setattr(delays, "release_pictures", pictures)
-    _, estimates = correct_delays(Pull(*looked_at), params)
+    _, estimates = correct_delays(pulled(*looked_at), params)
     assert (
         estimates.pose.applied != late_start
         and estimates.pose.alone == alone

@@ -9,7 +9,7 @@ import pytest
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.phases import phases
-from sling2sim2real.recording.build import episode_of, process_pulls
+from sling2sim2real.recording.build import episode_of, process_recording
 from sling2sim2real.recording.release import find_release, find_releases
 from tests.project import with_
 from tests.recording.conftest import written
@@ -27,7 +27,7 @@ EXPECTED = {
     "fast": "loading unloading reloading pause recoil swing",
     "cycles": "loading unloading reloading unloading reloading pause recoil swing",
 }
-ASIDE = {"picture_rate", "pause"}  # as the recordings are made
+ASIDE = {"rate", "pause"}  # as the recordings are made
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ LONG = pytest.param("cycles", marks=pytest.mark.slow)
 def done(request, params, tmp_path_factory):
     """(name, truth, the one pull that is in it); to be read only."""
     path, truth = written(tmp_path_factory, f"{request.param}.mcap", truth=led(request.param))
-    usable, refused = process_pulls(path, params.bands["band1"], params)
+    usable, refused = process_recording(path, params.bands["band1"], params)
     assert not refused
     (pull,) = usable
     return request.param, truth, pull
@@ -73,8 +73,8 @@ def test_no_check_takes_a_dip_for_a_fault(done) -> None:
 def test_it_is_one_pull_whose_events_are_found(done) -> None:
     _, truth, pull = done
     signals = pull.signals
-    assert pull.start + signals.release_time == pytest.approx(truth.release, abs=1e-3)
-    assert pull.start + signals.grasp_time == pytest.approx(truth.grasp, abs=0.021)
+    assert pull.whole.start + signals.release_time == pytest.approx(truth.release, abs=1e-3)
+    assert pull.whole.start + signals.grasp_time == pytest.approx(truth.grasp, abs=0.021)
     assert not signals.facts.slips and not signals.facts.zeroed
 
 
@@ -89,19 +89,19 @@ def test_the_window_follows_the_interaction(done, params) -> None:
     else:
         assert usual.samples < len(signals.time) <= (needed + 0.5) / period + 2
     assert len(pull.view.times) == pytest.approx(15 * signals.duration, abs=2)
-    episode = episode_of(pull, "band1", params)
+    episode = episode_of(pull, "band1")
     assert [phase.kind for phase in phases(episode)] == EXPECTED[name].split()
-    hand = np.array([truth.hand(pull.start + time) for time in episode.time])
+    hand = np.array([truth.hand(pull.whole.start + time) for time in episode.time])
     np.testing.assert_allclose(episode.position, hand, atol=1e-3)
 
 
 def test_beyond_the_longest_it_is_refused_in_one_line(done, params) -> None:
     short = with_(params, "episode", longest=3.6, duration=3.6, samples=120, tail=0.5)
-    path = done[2].pull.recording.path
+    path = done[2].part.recording.path
     if done[0] == "fast":
         return
     with pytest.raises(UserError, match=r"more than episode.longest 3.6 s .* fewer cycles"):
-        process_pulls(path, short.bands["band1"], short)
+        process_recording(path, short.bands["band1"], short)
 
 
 @pytest.mark.parametrize("leg", [0.1, 0.15, 0.2, 0.3, 0.5])

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from sling2sim2real.episode.episode import Episode
+from sling2sim2real.recording import images
 from sling2sim2real.recording.build import build_episodes
-from sling2sim2real.recording.input import images
-from sling2sim2real.recording.input.reader import Recording, read_recording
+from sling2sim2real.recording.streams import Recording, read_recording
 from validation.recordings.foxglove_bag import translate
 
 

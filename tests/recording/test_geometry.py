@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.geometry import geometry_of
-from sling2sim2real.recording.input.frames import Transform, TransformTree
+from sling2sim2real.recording.frames import geometry_of
+from sling2sim2real.recording.transforms import Transform, TransformTree
 
 SETUP = SimpleNamespace(base_to_fork=None, camera_to_fork=None, tip_link=None, fork_width=0.275)
 TURN = Rotation.from_euler("z", 30, degrees=True)

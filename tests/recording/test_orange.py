@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.params import BandParams, load
-from sling2sim2real.recording.build import episode_of, process
+from pipeline.params import load
+from sling2sim2real.recording.build import Processed, episode_of, process_recording
+from sling2sim2real.settings import BandParams
 from tests.project import DEFAULTS, ROOT
 
 FOLDER = ROOT.parent / "shared/recordings"
@@ -21,12 +22,14 @@ def recording(name: str) -> Path:
     return file
 
 
+def processed(name: str) -> Processed:
+    return process_recording(recording(name), BAND, load(DEFAULTS))[0][0]
+
+
 @pytest.fixture(scope="module")
 def built():
-    params = load(DEFAULTS)
-    params = params.model_copy(update={"bands": {**params.bands, "orange": BAND}})
-    done = process(recording("orange"), BAND, params)
-    return done, episode_of(done, "orange", params)
+    done = processed("orange")
+    return done, episode_of(done, "orange")
 
 
 @pytest.fixture
@@ -51,12 +54,12 @@ def test_no_check_fires_on_a_sound_recording(built) -> None:
 @pytest.mark.validation
 @pytest.mark.parametrize("name", ["orange_2", "orange_3"])
 def test_no_check_fires_on_its_other_recordings(name: str) -> None:
-    assert process(recording(name), BAND, load(DEFAULTS)).findings == []
+    assert processed(name).findings == []
 
 
 def test_clouds_of_the_drawn_band(built) -> None:
     done, episode = built
-    share, offset = done.taut_coverage
+    share, offset = done.whole.taut_coverage
     assert share > 0.9 and offset == pytest.approx(0.005, abs=0.002)
     tips = np.array([[-0.1375, 0, 0], [0.1375, 0, 0]])
     hand, near, covered = np.array([0, -0.4, 0]), [], []

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.build import process
-from sling2sim2real.recording.checks import pictures
-from sling2sim2real.recording.input.images import depth
-from sling2sim2real.recording.input.readings import Picture
+from sling2sim2real.recording.images import depth
+from sling2sim2real.recording.messages import Picture
+from tests.recording.conftest import whole_of
+from tests.recording.made import of_pictures
 from validation.recordings.bag import Lens, write_bag
 from validation.recordings.small import TRUTH, small_params
 
@@ -23,7 +23,7 @@ def looked_at(folder, change):
     """What becomes of a small recording with these pictures."""
     path = folder / "my.mcap"
     write_bag(path, TRUTH, rate=200, pose_rate=50, lens=LENS, change=change)
-    return process(path, PARAMS.bands["band1"], PARAMS)
+    return whole_of(path, PARAMS)
 
 
 def of_color(edit):
@@ -52,7 +52,7 @@ def test_what_can_be_decoded_is_read_and_the_rest_is_counted_as_colour(tmp_path)
     padded = looked_at(tmp_path, of_color(lambda k, data: data + bytes(3000)))
     assert padded.clouds.damaged == padded.clouds.damaged_colors == 0
     some = looked_at(tmp_path, of_color(lambda k, data: data[: len(data) // (1 + (k % 4 == 0))]))
-    output = [finding.what for finding in pictures.findings(some) if finding.about == "damaged"]
+    output = [finding.what for finding in of_pictures(some) if finding.about == "damaged"]
     assert output == [f"{some.clouds.damaged_colors} colour pictures cannot be decoded"]
     assert len(some.clouds.points) + some.clouds.damaged == len(padded.clouds.points)
 
@@ -91,7 +91,7 @@ def test_depth_of_another_unit_or_order(
 ) -> None:
     """What a driver would send is put in the place of what the recording holds."""
     from sling2sim2real.recording import build
-    from sling2sim2real.recording.input.reader import Recording
+    from sling2sim2real.recording.streams import Recording
 
     read = build.read_recording
 

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording import pulls
-from sling2sim2real.recording.build import build_episodes, process_pulls
-from sling2sim2real.recording.input import reader
-from sling2sim2real.recording.input.reader import read_recording
+from sling2sim2real.recording import build, events, streams
+from sling2sim2real.recording.build import build_episodes, process_recording
+from sling2sim2real.recording.events import Part, Pull, parts_of
+from sling2sim2real.recording.frames import geometry_of
 from sling2sim2real.recording.motion import Motion
-from sling2sim2real.recording.pulls import Pull, pulls_of
+from sling2sim2real.recording.streams import read_recording
 from tests.project import with_
-from tests.recording.conftest import written
+from tests.recording.conftest import part_of, pull_of, written
 from tests.recording.parts import joined
 from validation.recordings.bag import START, Truth, blind_bag, edit
 
@@ -66,11 +66,11 @@ def test_each_pull_is_as_its_truth_and_as_in_a_file_of_its_own(
 
 def test_a_shallow_pull_beside_a_deep_one_is_no_slip(both, params) -> None:
     """The fingers open, and the hand is free. Between the two it serves both."""
-    whole = Pull.of(read_recording(both[0], params.setup), params.setup)
-    recording, releases = whole.recording, whole.releases
+    whole = part_of(read_recording(both[0], params.setup), params)
+    recording = whole.recording
+    pulls = [Pull.of(part) for part in parts_of(recording, whole.geometry)]
     wanted = [DEEP.release, SHALLOW.release + both[1][1]]
-    np.testing.assert_allclose(releases, wanted, atol=0.01)
-    pulls = pulls_of(whole)
+    np.testing.assert_allclose([pull.release.time for pull in pulls], wanted, atol=0.01)
     assert [(pull.number, pull.count) for pull in pulls] == [(1, 2), (2, 2)]
     assert {pull.recording.origin for pull in pulls} == {recording.origin}
     first, second = ([pull.force_time[k] for k in (0, -1)] for pull in pulls)
@@ -80,12 +80,12 @@ def test_a_shallow_pull_beside_a_deep_one_is_no_slip(both, params) -> None:
 
 def test_what_holds_one_pull_or_is_not_understood_stays_whole(blind, params) -> None:
     recording = read_recording(blind[0], params.setup)
-    whole = Pull.of(recording, params.setup)
-    assert pulls_of(whole) == [whole]
+    whole = part_of(recording, params)
+    assert parts_of(recording, whole.geometry) == [whole]
     assert recording.origin == recording.wrench.stamp[0]
     still = replace(recording.wrench, values=0 * recording.wrench.values)
-    still = Pull.of(replace(recording, wrench=still), params.setup)
-    assert still.releases == [] and pulls_of(still) == [still]
+    still = replace(recording, wrench=still)
+    assert parts_of(still, whole.geometry) == [Part(still, whole.geometry)]
 
 
 def test_a_pull_that_cannot_be_used_is_named_and_the_others_are_used(
@@ -94,8 +94,8 @@ def test_a_pull_that_cannot_be_used_is_named_and_the_others_are_used(
     """The second one's pictures are black."""
     path = tmp_path / "half.mcap"
     joined(path, [seen[0], blind_bag(tmp_path, SHALLOW)])
-    results, refused = process_pulls(path, params.bands["band1"], params)
-    assert [done.pull.number for done in results] == [1]
+    results, refused = process_recording(path, params.bands["band1"], params)
+    assert [done.part.number for done in results] == [1]
     (line,) = map(str, refused)
     assert line.startswith(f"{path}: pull 2 of 2: ") and "empty mask" in line and "\n" not in line
 
@@ -112,8 +112,8 @@ def test_a_band_that_slips_out_between_two_pulls_is_a_pull_that_cannot_be_used(
     path = tmp_path / "slipped.mcap"
     closed = blind_bag(tmp_path, change=edit(gripper=stay))
     joined(path, [seen[0], closed, seen[0]])
-    results, refused = process_pulls(path, params.bands["band1"], params)
-    assert [done.pull.number for done in results] == [1, 3]
+    results, refused = process_recording(path, params.bands["band1"], params)
+    assert [done.part.number for done in results] == [1, 3]
     assert "pull 2 of 3: the force drops at" in str(refused[0])
     assert "gripper stays closed" in str(refused[0])
     alone = checked.signals.facts.bias
@@ -128,19 +128,20 @@ def test_a_force_that_fails_for_a_while_does_not_end_a_pull(seen, params) -> Non
     force = recording.wrench.values.copy()
     force[(time > 2.4) & (time < 2.75)] = force[0]
     failed = replace(recording, wrench=replace(recording.wrench, values=force))
-    assert Pull.of(failed, params.setup).releases == pytest.approx([DEEP.release], abs=0.05)
+    assert len(parts_of(failed, geometry_of(failed, params.setup))) == 1
+    assert pull_of(failed, params).release.time == pytest.approx(DEEP.release, abs=0.05)
 
 
 def test_where_none_can_be_used_the_first_says_why(blind, tmp_path, params) -> None:
     path = tmp_path / "black.mcap"
     joined(path, [blind[0], blind[0]])
     with pytest.raises(UserError, match=r"black.mcap: pull 1 of 2: .*empty mask"):
-        process_pulls(path, params.bands["band1"], params)
+        process_recording(path, params.bands["band1"], params)
 
 
 @pytest.mark.parametrize("delay", [None, 0.001])
 def test_one_recording_is_read_and_understood_once(seen, params, monkeypatch, delay) -> None:
-    """One motion for the stamps as recorded, one more where the pose's are corrected."""
+    """One motion to part it, one for the stamps as recorded, one where the pose's are corrected."""
     calls: Counter[str] = Counter()
 
     def count(module, name: str) -> None:
@@ -152,11 +153,11 @@ def test_one_recording_is_read_and_understood_once(seen, params, monkeypatch, de
 
         monkeypatch.setattr(module, name, counted)
 
-    count(reader, "read_container")
-    count(pulls, "geometry_of")
+    count(streams, "read_container")
+    count(build, "geometry_of")
     count(Motion, "of")
     for name in ("find_releases", "find_release", "find_grasp"):
-        count(pulls, name)
+        count(events, name)
     given = with_(params, "episode.delays", pose=delay, camera=None)
     build_episodes(seen[0], "band1", given)
     assert calls == {
@@ -164,13 +165,13 @@ def test_one_recording_is_read_and_understood_once(seen, params, monkeypatch, de
         "geometry_of": 1,
         "find_releases": 1,  # whether there are several
         "find_release": 1,
-        "of": 1,
+        "of": 2,
         "find_grasp": 1,  # a given delay is taken off as the file is read
     }
 
 
 def test_a_pull_with_other_stamps_keeps_what_they_do_not_change(seen, params) -> None:
-    pull = Pull.of(read_recording(seen[0], params.setup), params.setup)
+    pull = pull_of(seen[0], params)
     grasp, release, motion = pull.grasp, pull.release, pull.motion
     seen_late = pull.shifted(camera=0.01)
     assert seen_late.motion is motion and seen_late.release is release
@@ -178,4 +179,6 @@ def test_a_pull_with_other_stamps_keeps_what_they_do_not_change(seen, params) ->
     moved = pull.shifted(pose=0.01)
     assert moved.release is release and moved.motion is not motion
     np.testing.assert_allclose(moved.motion.time, motion.time - 0.01, atol=1e-9)
-    assert moved.grasp == Pull(moved.recording, moved.geometry).grasp == pytest.approx(grasp)
+    assert (
+        moved.grasp == Pull.of(Part(moved.recording, moved.geometry)).grasp == pytest.approx(grasp)
+    )

@@ -10,15 +10,20 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.recording.events import Part, Pull
+from sling2sim2real.recording.force import estimate_tool_inertia
 from sling2sim2real.recording.signals import ToolFacts, signals_of
-from sling2sim2real.recording.tool_inertia import estimate_tool_inertia
 from tests.project import with_
 from tests.recording.played import GRAVITY, Played, stream
 from validation.recordings.bag import HAND, SENSOR, START, Truth
 
 MASS = 0.73
 TOOL = (0.01, -0.02, 0.05)  # its centre of mass
+
+
+def pulled(*given) -> Pull:
+    """Of a recording and its geometry, as if it were one pull."""
+    return Pull.of(Part(*given))
 
 
 def tool(mass: float = MASS, center=TOOL) -> SimpleNamespace:
@@ -28,7 +33,7 @@ def tool(mass: float = MASS, center=TOOL) -> SimpleNamespace:
 def signals(played: Played, params, tool=None, recording=None, inertia=None):
     recording = recording or played.recording()
     params = with_(params, "setup", tool=tool)
-    return signals_of(Pull(recording, played.geometry()), params, inertia)
+    return signals_of(pulled(recording, played.geometry()), params, inertia)
 
 
 def off(played: Played, result) -> np.ndarray:
@@ -83,7 +88,7 @@ def test_the_inertia_of_a_hand_that_does_not_turn(params) -> None:
 def test_a_tool_that_nobody_named_is_measured(params) -> None:
     """Its inertia in free motion shows its mass, with which it is gone from the pull, too."""
     played = Played(mass=MASS, truth=Truth(noise=0.005))
-    inertia = estimate_tool_inertia(Pull(played.recording(), played.geometry()), None)
+    inertia = estimate_tool_inertia(pulled(played.recording(), played.geometry()), None)
     assert inertia.mass == pytest.approx(MASS, rel=0.03)
     result = band_alone(played, params, inertia)
     assert result.facts.tool.source == "its inertia"
@@ -98,7 +103,7 @@ def test_a_sensor_that_takes_off_too_much_or_has_the_other_sign(params) -> None:
         Played(mass=-0.3, truth=Truth(noise=0.005)),
         Played(mass=MASS, truth=Truth(noise=0.005, sign=-1.0)),
     ):
-        inertia = estimate_tool_inertia(Pull(played.recording(), played.geometry()), None)
+        inertia = estimate_tool_inertia(pulled(played.recording(), played.geometry()), None)
         assert inertia.mass == pytest.approx(played.truth.sign * played.mass, rel=0.03)
         band_alone(played, params, inertia)
 
@@ -110,7 +115,7 @@ def test_a_sensor_that_knows_the_weight_but_not_the_inertia(params) -> None:
     t = recording.wrench.seconds(START)
     weight = (played.orientation(t) * SENSOR).inv().apply(MASS * GRAVITY)
     recording.wrench = replace(recording.wrench, values=recording.wrench.values - weight)
-    inertia = estimate_tool_inertia(Pull(recording, played.geometry()), None)
+    inertia = estimate_tool_inertia(pulled(recording, played.geometry()), None)
     assert inertia.mass == pytest.approx(MASS, rel=0.05)
     band_alone(played, params, replace(inertia, center=TOOL), recording)
 
@@ -121,7 +126,7 @@ def test_a_delay_that_is_left_does_not_displace_the_inertia(params) -> None:
     recording = played.recording()
     pose = recording.pose
     recording.pose = replace(pose, stamp=pose.stamp + 20_000_000)
-    inertia = estimate_tool_inertia(Pull(recording, played.geometry()), None)
+    inertia = estimate_tool_inertia(pulled(recording, played.geometry()), None)
     assert inertia.delay == pytest.approx(0.02, abs=0.002)
     band_alone(played, params, inertia, recording)
 

@@ -78,28 +78,26 @@ def recorded(recording: str, work: Path, folder: Path | None) -> Path:
 
 def checked(path: Path, recording: str) -> tuple[list[dict], s2s.Episode | None]:
     """What the checks find, each with its concern, and the episode where there is one."""
-    from sling2sim2real.recording.build import episode_of, process_pull
-    from sling2sim2real.recording.checks.table import CONCERNS
-    from sling2sim2real.recording.input.reader import read_recording
-    from sling2sim2real.recording.pulls import Pull
+    from sling2sim2real.recording.build import episode_of, process
+    from sling2sim2real.recording.checks import CHECKS
+    from sling2sim2real.recording.events import Part
+    from sling2sim2real.recording.frames import geometry_of
+    from sling2sim2real.recording.streams import read_recording
 
     params, band = params_of(recording)
-    concern = {
-        check.name: module.__name__.rpartition(".")[2]
-        for module in CONCERNS
-        for check in module.CHECKS
-    }
     try:
-        pull = Pull.of(read_recording(path, params.setup), params.setup)
-        done = process_pull(pull, params.bands[band], params)
+        recorded = read_recording(path, params.setup)
+        part = Part(recorded, geometry_of(recorded, params.setup))
+        done = process(part, params.bands[band], params)
+        episode = episode_of(done, band)
     except UserError as error:
         text = str(error).removeprefix(f"{path}: ")
         return [{"about": "", "concern": "", "what": text, "refused": True}], None
     findings = [
-        {"about": name, "concern": concern[name], "what": what, "refused": False}
+        {"about": name, "concern": CHECKS[name].concern, "what": what, "refused": False}
         for name, what in ((finding.about, finding.what) for finding in done.findings)
     ]
-    return findings, episode_of(done, band, params)
+    return findings, episode
 
 
 def identified(episode: s2s.Episode, recording: str, start: s2s.Model | None) -> s2s.Identification:

@@ -3,7 +3,7 @@
 import pytest
 
 from pipeline.params import Params
-from sling2sim2real.recording.cloud import clouds_of
+from sling2sim2real.recording.clouds import clouds_of
 from validation.recordings import looks
 from validation.recordings.scores import figures
 

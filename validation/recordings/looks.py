@@ -16,12 +16,12 @@ import numpy as np
 import open3d as o3d
 from scipy.spatial.transform import Rotation
 
-from sling2sim2real.recording.geometry import Geometry
-from sling2sim2real.recording.input.camera import Camera
-from sling2sim2real.recording.input.frames import Transform
-from sling2sim2real.recording.input.reader import Recording, Stream
-from sling2sim2real.recording.input.readings import Picture
-from sling2sim2real.recording.view import Scene, View
+from sling2sim2real.recording.camera import Camera
+from sling2sim2real.recording.frames import Geometry
+from sling2sim2real.recording.messages import Picture
+from sling2sim2real.recording.scene import Scene, View
+from sling2sim2real.recording.streams import Recording, Stream
+from sling2sim2real.recording.transforms import Transform
 from validation.recordings import strand
 from validation.recordings.bag import FLOOR
 from validation.recordings.strand import GRASP, RELEASE, REST, TIPS

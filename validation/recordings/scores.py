@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sling2sim2real.recording.view import View
+from sling2sim2real.recording.scene import View
 from validation.recordings import strand
 from validation.recordings.looks import BAND, FrameTruth
 from validation.recordings.strand import GRASP, RELEASE, REST, TIPS

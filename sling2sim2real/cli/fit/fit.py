@@ -22,8 +22,8 @@ from sling2sim2real.cli.params_file import edited
 from sling2sim2real.cli.preflight.add_band import NAME, add_band
 from sling2sim2real.cli.preflight.recordings import add_recording, digests, renew_masks
 from sling2sim2real.identification.posterior.evidence import read_evidence
-from sling2sim2real.recording.input.bag import name_of as name_of_file
-from sling2sim2real.recording.input.bag import once
+from sling2sim2real.recording.files import name_of as name_of_file
+from sling2sim2real.recording.files import once
 from stages.start import stage_of
 
 

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from pipeline.params import Params
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.safety import of_mounting, tell
-from sling2sim2real.recording.input.frames import Transform
+from sling2sim2real.recording.transforms import Transform
 from sling2sim2real.settings.lab import BandParams, SetupParams
 
 ALIKE = 0.02  # relative: stretches that are as good as equal
@@ -48,18 +48,19 @@ def read_earlier(path: Path, params: Params) -> Earlier:
 
     Of several pulls, the first that can be used.
     """
-    from sling2sim2real.recording.input.reader import read_recording
-    from sling2sim2real.recording.pulls import Pull, pulls_of
+    from sling2sim2real.recording.events import Pull, parts_of
+    from sling2sim2real.recording.frames import geometry_of
     from sling2sim2real.recording.signals import signals_of
+    from sling2sim2real.recording.streams import read_recording
 
     recording = read_recording(Path(path), params.setup, params.episode.delays)
-    whole = Pull.of(recording, params.setup)
-    base, source = whole.geometry.base, whole.geometry.sources["base_to_fork"]
-    frame, problem = whole.recording.pose.frame, None
+    geometry = geometry_of(recording, params.setup)
+    base, source = geometry.base, geometry.sources["base_to_fork"]
+    frame, problem = recording.pose.frame, None
     try:
-        for pull in pulls_of(whole):
+        for part in parts_of(recording, geometry):
             try:
-                signals = signals_of(pull, params)
+                signals = signals_of(Pull.of(part), params)
             except UserError as error:
                 problem = problem or f"{path}: {str(error).removeprefix(f'{path}: ')}"
                 continue

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from sling2sim2real.cli.plan.trajectory import Trajectory
-from sling2sim2real.recording.input.frames import Transform
+from sling2sim2real.recording.transforms import Transform
 
 COLUMNS = (
     "t x y z qx qy qz qw vx vy vz ax ay az opening phase".split()  # s, m, m/s, m/s^2; robot's base

@@ -24,8 +24,8 @@ from sling2sim2real.cli.plan.pull import hanging_middle, trajectory_of
 from sling2sim2real.cli.plan.trajectory import Trajectory
 from sling2sim2real.cli.pose import fork_in_base
 from sling2sim2real.cli.sizes import band_to_come
-from sling2sim2real.recording.geometry import FORK
-from sling2sim2real.recording.input.frames import Transform
+from sling2sim2real.recording.frames import FORK
+from sling2sim2real.recording.transforms import Transform
 from sling2sim2real.settings import expect_known
 from sling2sim2real.settings.lab import Gripper
 

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from sling2sim2real.cli.plan.trajectory import Phase, Trajectory
 from sling2sim2real.episode.planned import LET_BACK, REDRAW, leg_time, legs_of
 from sling2sim2real.episode.window import LEAD
-from sling2sim2real.recording.pulls import CALM
+from sling2sim2real.recording.events import CALM
 from sling2sim2real.settings.lab import BandParams, PlanParams, SetupParams
 from sling2sim2real.settings.recording import EpisodeParams
 

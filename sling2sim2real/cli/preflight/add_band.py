@@ -16,7 +16,7 @@ from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli.params_file import edited
 from sling2sim2real.cli.preflight import recordings as files
 from sling2sim2real.cli.sizes import DIAMETER, REST_LENGTH, assumed
-from sling2sim2real.recording.input.bag import once
+from sling2sim2real.recording.files import once
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 

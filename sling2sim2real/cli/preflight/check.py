@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pipeline.params import Params
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.preflight.facts import (
     BandFacts,
@@ -18,15 +19,14 @@ from sling2sim2real.cli.preflight.facts import (
 from sling2sim2real.cli.preflight.report import CheckReport, Chosen, Topic
 from sling2sim2real.cli.sizes import assumed, band_to_come
 from sling2sim2real.episode.phases import phases_of_hand, unseen
-from sling2sim2real.recording.build import Checked
-from sling2sim2real.recording.checks.finding import Finding
-from sling2sim2real.recording.checks.table import UNDERSTOOD
-from sling2sim2real.recording.coverage import by_phase
-from sling2sim2real.recording.input.bag import sha256
-from sling2sim2real.recording.input.container import Container, read_container
-from sling2sim2real.recording.input.reader import Recording, recording_of
-from sling2sim2real.recording.pulls import Pull, pulls_of
-from sling2sim2real.settings import Settings, expect_known
+from sling2sim2real.recording.build import Processed, Whole, process
+from sling2sim2real.recording.checks import Finding
+from sling2sim2real.recording.clouds import by_phase
+from sling2sim2real.recording.events import parts_of
+from sling2sim2real.recording.files import Container, read_container, sha256
+from sling2sim2real.recording.frames import geometry_of
+from sling2sim2real.recording.streams import Recording, recording_of
+from sling2sim2real.settings import expect_known
 from sling2sim2real.settings.lab import BandParams
 
 
@@ -36,14 +36,14 @@ class Look:
 
     Attributes:
         recording: With its stamps corrected where the pull can be used.
-        done: The pull that the report is about, where it can be used.
+        done: The pull that the report is about, where it was processed to its end.
         pulls: All of the recording, as far as each goes.
     """
 
     report: CheckReport
     recording: Recording | None = None
-    done: Checked | None = None
-    pulls: Sequence[Checked] = ()
+    done: Whole | None = None
+    pulls: Sequence[Processed] = ()
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class GivenBand:
 
 def look_at(
     path: Path,
-    params: Settings,
+    params: Params,
     band: GivenBand,
     pull: int | None = None,
 ) -> Look:
@@ -92,14 +92,14 @@ def look_at(
         recording = recording_of(container, params.setup, params.episode.delays)
         report.losses, report.notes = recording.losses, recording.notes
         _add_roles(report.topics, recording)
-        pulls = pulls_of(Pull.of(recording, params.setup))
+        parts = parts_of(recording, geometry_of(recording, params.setup))
     except UserError as error:
         report.problem = _without(path, error)
         report.pulls = [report.row] if recording else []
         return Look(report, recording)
-    if pull is not None and pull > len(pulls):
-        raise UserError(f"--pull {pull}: the last pull in {path} is number {len(pulls)}")
-    processed = [Checked.of(each, band.params, params, band.weighed) for each in pulls]
+    if pull is not None and pull > len(parts):
+        raise UserError(f"--pull {pull}: the last pull in {path} is number {len(parts)}")
+    processed = [process(part, band.params, params, band.weighed) for part in parts]
     looks = [_look_at_pull(replace(report), pull_checked) for pull_checked in processed]
     usable = [look for look in looks if look.report.usable]
     chosen = looks[pull - 1] if pull else (usable or looks)[0]
@@ -108,7 +108,7 @@ def look_at(
 
 
 def band_of(
-    params: Settings,
+    params: Params,
     name: str | None = None,
     mass: float | None = None,
     diameter: float | None = None,
@@ -130,28 +130,27 @@ def band_of(
     return GivenBand(band, source, weighed=mass is not None)
 
 
-def _look_at_pull(report: CheckReport, done: Checked) -> Look:
-    """Fills the report of what the file is with what the pull is."""
-    recording = done.pull.recording
-    report.pull, report.frames = done.pull.number, done.pull.geometry.sources
-    report.delays = DelayFacts.of(done.delays)
-    report.cautions, refusal = done.cautions, done.refusal
+def _look_at_pull(report: CheckReport, done: Processed) -> Look:
+    """Fills the report of what the file is with what the pull is, as far as it can be used."""
+    part, signals, whole, refusal = done.part, done.signals, done.whole, done.refusal
+    recording = whole.pull.recording if whole else part.recording
+    report.pull, report.frames = part.number, part.geometry.sources
+    report.cautions = done.cautions
     report.problem = _without(recording.path, refusal) if refusal else None
-    try:
-        report.signals = SignalSummary.of(done)
-        phases = phases_of_hand(done.signals)
-        report.motion = [MotionPhase.of(phase, done.start) for phase in phases]
+    if done.delays:
+        report.delays = DelayFacts.of(done.delays)
+    if signals and done.scene:
+        report.signals = facts = SignalSummary.of(recording, signals, done.scene)
+        phases = phases_of_hand(signals)
+        report.motion = [MotionPhase.of(phase, facts.window_start_s) for phase in phases]
         report.keeps_prior = unseen(phases)
-        if refusal and refusal.about == UNDERSTOOD.name:
-            return Look(report, recording)
-        report.cloud = CloudFacts.of(done)
-    except UserError:
-        return Look(report, recording)
-    report.coverage = done.coverage
-    report.phases = by_phase(report.coverage)
-    if done.tips:
-        report.extrinsics = ExtrinsicFacts.of(done.tips, done)
-    return Look(report, recording, done)
+    if whole:
+        report.cloud = CloudFacts.of(whole.clouds, whole.taut_coverage)
+        report.coverage = whole.coverage
+        report.phases = by_phase(report.coverage)
+        if whole.calibration:
+            report.extrinsics = ExtrinsicFacts.of(whole.calibration, part.geometry)
+    return Look(report, recording, whole)
 
 
 def _without(path: Path, problem: UserError | Finding) -> str:

@@ -7,10 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from sling2sim2real.episode.phases import InteractionPhase
-from sling2sim2real.recording.checks.camera import camera_to_fork
+from sling2sim2real.recording.calibration import Calibration
+from sling2sim2real.recording.checks import camera_to_fork
+from sling2sim2real.recording.clouds import Clouds
 from sling2sim2real.recording.delays import Delays
-from sling2sim2real.recording.processed import Processed
-from sling2sim2real.recording.tips import Tips
+from sling2sim2real.recording.frames import Geometry
+from sling2sim2real.recording.scene import Scene
+from sling2sim2real.recording.signals import Signals
+from sling2sim2real.recording.streams import Recording
 
 
 @dataclass(frozen=True)
@@ -45,11 +49,10 @@ class SignalSummary:
     stretch: float
 
     @classmethod
-    def of(cls, done: Processed) -> SignalSummary:
-        """Raises UserError where the pull cannot be understood."""
-        recording, signals, scene = done.pull.recording, done.signals, done.scene
+    def of(cls, recording: Recording, signals: Signals, scene: Scene) -> SignalSummary:
+        """Of a pull that is understood."""
         facts = signals.facts
-        start = done.start
+        start = (signals.origin - recording.origin) * 1e-9
         return cls(
             window_start_s=start,
             grasp_s=start + signals.grasp_time,
@@ -132,11 +135,10 @@ class CloudFacts:
     taut_offset_m: float | None
 
     @classmethod
-    def of(cls, done: Processed) -> CloudFacts:
-        """Raises UserError where the pictures show no band."""
-        clouds = done.clouds
+    def of(cls, clouds: Clouds, taut: tuple[float | None, float | None]) -> CloudFacts:
+        """Of the clouds, and what `clouds.taut_coverage` says of them."""
         sizes = [len(points) for points in clouds.points]
-        covered, off = done.taut_coverage
+        covered, off = taut
         return cls(
             frames=len(sizes),
             empty=clouds.empty,
@@ -160,12 +162,8 @@ class ExtrinsicFacts:
     pictures: int
     off_m: float
     off_error_m: float
-    left_tip_m: list[float]
-    left_tip_error_m: list[float]
-    right_tip_m: list[float]
-    right_tip_error_m: list[float]
-    turn_deg: list[float]
-    turn_error_deg: list[float]
+    tips_m: list[float]
+    tips_error_m: list[float]
     hand_off_m: float
     hand_off_error_m: float
     hand_m: list[float]
@@ -174,22 +172,15 @@ class ExtrinsicFacts:
     camera_to_fork: list[float]
 
     @classmethod
-    def of(cls, tips: Tips, done: Processed) -> ExtrinsicFacts:
-        turn = tips.correction.rotation.as_rotvec()
+    def of(cls, seen: Calibration, geometry: Geometry) -> ExtrinsicFacts:
         return cls(
-            pictures=tips.frames,
-            off_m=tips.off,
-            off_error_m=tips.off_error,
-            left_tip_m=tips.offsets[0].tolist(),
-            left_tip_error_m=tips.errors[0].tolist(),
-            right_tip_m=tips.offsets[1].tolist(),
-            right_tip_error_m=tips.errors[1].tolist(),
-            turn_deg=np.degrees(-turn).tolist(),
-            turn_error_deg=np.degrees(tips.rotation_error).tolist(),
-            hand_off_m=tips.hand_off,
-            hand_off_error_m=tips.hand_off_error,
-            hand_m=tips.hand.tolist(),
-            hand_error_m=tips.hand_error.tolist(),
-            residual_m=tips.residual,
-            camera_to_fork=camera_to_fork(tips, done.pull.geometry),
+            seen.frames,
+            *seen.camera_off,
+            seen.camera.tolist(),
+            seen.camera_error.tolist(),
+            *seen.hand_off,
+            seen.hand.tolist(),
+            seen.hand_error.tolist(),
+            seen.residual,
+            camera_to_fork(seen, geometry),
         )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 
 import cv2
@@ -12,8 +11,8 @@ import cv2
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import replacing_folder
 from sling2sim2real.cli.preflight.output import expect_folder
-from sling2sim2real.recording.masks.folder import mask_name
-from sling2sim2real.recording.processed import Processed
+from sling2sim2real.recording.build import Processed
+from sling2sim2real.recording.mask_folder import mask_name
 
 
 def expect_new(folder: Path) -> None:
@@ -37,10 +36,7 @@ def write_pictures(pulls: Sequence[Processed], folder: Path) -> str:
         UserError: where `folder` cannot be made or is there.
     """
     expect_new(folder)
-    views = []
-    for pull in pulls:
-        with suppress(UserError):  # the report says why there is nothing to see
-            views.append(pull.view)
+    views = [pull.view for pull in pulls if pull.view]  # the report says why others have none
     if not views:
         return f"{folder} was not written: no pull is understood"
     with replacing_folder(folder) as temporary:

@@ -7,19 +7,17 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from pipeline.params import load
+from pipeline.params import Params, load
 from sling2sim2real.base.disk import expect_writable
 from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.base.files import replacing, replacing_folder
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli.preflight.check import GivenBand, look_at
 from sling2sim2real.cli.preflight.report import CheckReport
-from sling2sim2real.recording import stored
-from sling2sim2real.recording.build import episode_of
-from sling2sim2real.recording.input import bag
-from sling2sim2real.recording.input.bag import sha256
-from sling2sim2real.recording.masks.folder import MASK_NAME, masks_beside
-from sling2sim2real.settings import Settings, expect_known
+from sling2sim2real.recording import files as bag
+from sling2sim2real.recording.files import sha256
+from sling2sim2real.recording.mask_folder import MASK_NAME, masks_beside
+from sling2sim2real.settings import expect_known
 
 
 def add_recording(band: str, recordings: Sequence[Path], root: Path | str = ".") -> str:
@@ -72,22 +70,15 @@ def digests(recordings: Sequence[Path]) -> dict[str, Path]:
 
 
 def checked(
-    recordings: Sequence[Path], params: Settings, band: str, layout: Layout
+    recordings: Sequence[Path], params: Params, band: str, layout: Layout
 ) -> list[CheckReport]:
-    """What `sling check` says of each. Raises UserError where one cannot be used.
-
-    The episodes that it makes on its way are kept for the stage that wants them.
-    """
-    reports, made = [], {}
+    """What `sling check` says of each. Raises UserError where one cannot be used."""
+    reports = []
     for file in recordings:
         look = look_at(file, params, GivenBand(params.bands[band]))
         reports.append(look.report)
         if not look.report.usable:
             raise UserError(f"{file}: {look.report.problem}")
-        if all(pull.usable for pull in look.report.pulls):
-            made[file] = [episode_of(pull, band, params) for pull in look.pulls]
-    for file, episodes in made.items():
-        stored.keep(file, episodes, params, layout)
     return reports
 
 

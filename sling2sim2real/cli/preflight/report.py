@@ -14,8 +14,8 @@ from sling2sim2real.cli.preflight.facts import (
     MotionPhase,
     SignalSummary,
 )
-from sling2sim2real.recording.checks.finding import Finding
-from sling2sim2real.recording.coverage import PhaseLine, PictureLine
+from sling2sim2real.recording.checks import Finding
+from sling2sim2real.recording.clouds import PhaseLine, PictureLine
 
 MOST_PHASES = 9  # in a line
 
@@ -280,9 +280,7 @@ def _extrinsics(facts: ExtrinsicFacts | None) -> list[str]:
     rows = [
         "",
         f"extrinsics, by the drawn band in {facts.pictures} pictures (frame O)",
-        f"  left tip off   {pair(facts.left_tip_m, facts.left_tip_error_m, 1e3)} mm",
-        f"  right tip off  {pair(facts.right_tip_m, facts.right_tip_error_m, 1e3)} mm",
-        f"  camera turned  {pair(facts.turn_deg, facts.turn_error_deg, 1, 2)} degrees",
+        f"  fork tips off  {pair(facts.tips_m, facts.tips_error_m, 1e3)} mm",
         f"  hand off       {pair(facts.hand_m, facts.hand_error_m, 1e3)} mm",
         f"  what is left   {1e3 * facts.residual_m:.1f} mm",
     ]

@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
+from pipeline.params import Params
 from sling2sim2real.base.files import replacing
 from sling2sim2real.cli.preflight.check import Look
 from sling2sim2real.cli.preflight.facts import SignalSummary
 from sling2sim2real.drawing.names import as_label
 from sling2sim2real.drawing.styles import COLORS, INK, THEME
-from sling2sim2real.recording.coverage import PictureLine
-from sling2sim2real.recording.input import images
-from sling2sim2real.recording.input.reader import Recording
-from sling2sim2real.recording.masks import masker
-from sling2sim2real.recording.processed import Processed
-from sling2sim2real.recording.view import RgbdFrame, Scene
-from sling2sim2real.settings import Settings
+from sling2sim2real.recording import images
+from sling2sim2real.recording.build import Whole
+from sling2sim2real.recording.clouds import PictureLine, masker
+from sling2sim2real.recording.scene import RgbdFrame, Scene
+from sling2sim2real.recording.streams import Recording
 from sling2sim2real.settings.recording import CloudParams
 
 if TYPE_CHECKING:
@@ -46,7 +45,7 @@ class Moment:
     points: np.ndarray
 
 
-def draw_sheet(look: Look, params: Settings, path: Path) -> str:
+def draw_sheet(look: Look, params: Params, path: Path) -> str:
     """Write a PNG, 1600 pixels wide, of what can be shown.
 
     Returns:
@@ -75,7 +74,7 @@ def draw_sheet(look: Look, params: Settings, path: Path) -> str:
 
 
 def masked_frames(
-    done: Processed, cloud: CloudParams, numbers: list[int] | None = None
+    done: Whole, cloud: CloudParams, numbers: list[int] | None = None
 ) -> Iterator[tuple[RgbdFrame, np.ndarray]]:
     """These or all pictures of the window with their masks, by the backend of params.cloud."""
     mask = masker(cloud.mask, done.view)
@@ -95,7 +94,7 @@ def moments(scene: Scene) -> dict[str, float]:
     return dict(zip(MOMENTS, when, strict=True))
 
 
-def _seen(done: Processed, params: Settings) -> list[Moment]:
+def _seen(done: Whole, params: Params) -> list[Moment]:
     when = moments(done.scene)
     times = done.clouds.time  # of the pictures that could be decoded
     which = [int(np.argmin(np.abs(times - time))) for time in when.values()]
@@ -108,7 +107,7 @@ def _seen(done: Processed, params: Settings) -> list[Moment]:
 
 
 def _whole(
-    figure: Figure, done: Processed, facts: SignalSummary, rows: list[PictureLine], params: Settings
+    figure: Figure, done: Whole, facts: SignalSummary, rows: list[PictureLine], params: Params
 ) -> None:
     from sling2sim2real.drawing.canvas import key, mark  # imports Matplotlib
 
@@ -149,7 +148,7 @@ def _overlaid(color: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return cv2.drawContours(large, outlines, -1, MASK, 1)
 
 
-def _cloud(axes: Axes, done: Processed, moment: Moment, a: int, b: int, labels: bool) -> None:
+def _cloud(axes: Axes, done: Whole, moment: Moment, a: int, b: int, labels: bool) -> None:
     scene, hand = done.scene, done.signals.hand(moment.time)
     axes.scatter(moment.points[:, a], moment.points[:, b], s=1.5, color=COLORS[1], linewidths=0)
     for tip in scene.tips:
@@ -169,7 +168,7 @@ def _cloud(axes: Axes, done: Processed, moment: Moment, a: int, b: int, labels: 
         axes.tick_params(labelbottom=False, labelleft=False)
 
 
-def _force(axes: Axes, done: Processed, facts: SignalSummary) -> None:
+def _force(axes: Axes, done: Whole, facts: SignalSummary) -> None:
     """Draw each component of the force and its size: seconds since the recording's first force."""
     signals, start = done.signals, facts.window_start_s
     time = start + signals.time
@@ -193,7 +192,7 @@ def _coverage(axes: Axes, rows: list[PictureLine]) -> None:
     other.grid(visible=False)
 
 
-def _events(axes: Axes, done: Processed, facts: SignalSummary, named: bool = False) -> None:
+def _events(axes: Axes, done: Whole, facts: SignalSummary, named: bool = False) -> None:
     for name, time in (("grasp", facts.grasp_s), ("release", facts.release_s)):
         axes.axvline(time, color=INK, lw=0.8, ls="--")
         if not named:

@@ -12,7 +12,6 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.plan.force import read_earlier
 from sling2sim2real.cli.plan.plan import plan_recording
 from sling2sim2real.cli.plan.trajectory import Trajectory
-from sling2sim2real.recording.input.reader import read_recording
 from tests.project import DEFAULTS, with_
 from validation.recordings.bag import BASE, HAND, REST, Truth, write_bag
 
@@ -149,22 +148,25 @@ def test_the_bands_own_recording_tells_it_unasked(recorded, tmp_path) -> None:
 
 def test_of_several_pulls_the_first_that_can_be_used_tells(recorded, monkeypatch) -> None:
     """A first pull that says nothing is passed over, as `check` does."""
-    from sling2sim2real.recording import pulls, signals
+    from sling2sim2real.recording import events
+    from sling2sim2real.recording.frames import geometry_of
+    from sling2sim2real.recording.streams import read_recording
 
     path, _, params, truth = recorded
-    (whole,) = pulls.pulls_of(pulls.Pull.of(read_recording(path, params.setup), params.setup))
-    tell = signals.signals_of
+    recording = read_recording(path, params.setup)
+    (whole,) = events.parts_of(recording, geometry_of(recording, params.setup))
+    find = events.Pull.of
 
-    def signals_of(pull, *others):
-        if pull == "bad":
+    def of(part):
+        if part == "bad":
             raise UserError("nothing is drawn")
-        return tell(pull, *others)
+        return find(part)
 
-    monkeypatch.setattr(signals, "signals_of", signals_of)
-    monkeypatch.setattr(pulls, "pulls_of", lambda *_: ["bad", whole])
+    monkeypatch.setattr(events.Pull, "of", of)
+    monkeypatch.setattr(events, "parts_of", lambda *_: ["bad", whole])
     force = float(np.linalg.norm(truth.force(truth.release - 0.1)))
     assert read_earlier(path, params).force == pytest.approx(force, rel=0.01)
-    monkeypatch.setattr(pulls, "pulls_of", lambda *_: ["bad", "bad"])
+    monkeypatch.setattr(events, "parts_of", lambda *_: ["bad", "bad"])
     assert read_earlier(path, params).problem == f"{path}: nothing is drawn"
 
 

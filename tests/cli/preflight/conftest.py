@@ -2,39 +2,36 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from pipeline.params import Params
 from sling2sim2real.cli.preflight.check import Look, band_of, look_at
-from sling2sim2real.recording.build import Checked
-from sling2sim2real.recording.pulls import Pull
+from sling2sim2real.recording.build import Processed, process
+from sling2sim2real.recording.events import Part
 from sling2sim2real.settings.lab import BandParams
 from tests.project import DEFAULTS
 from tests.recording.conftest import blind, masked, params, seen
 
 __all__ = ["blind", "masked", "params", "seen"]
-PROCESSED: dict[str, Checked] = {}
+PROCESSED: dict[str, Processed] = {}
 
 
-def processed_once(pull: Pull, band: BandParams, params: Params, weighed: bool) -> Checked:
-    """`Checked.of`, which for equal pulls of a file is worked out once in all these tests."""
+def processed_once(part: Part, band: BandParams, params: Params, weighed: bool) -> Processed:
+    """`process`, which for equal pulls of a file is worked out once in all these tests."""
     if params.cloud.mask == "folder":  # the masks may be others
-        return Checked.of(pull, band, params, weighed)
+        return process(part, band, params, weighed)
     settings = params.model_dump(exclude={"run", "bands"})
-    key = repr((pull.recording.path, pull.recording.sha256, pull.number, band, settings, weighed))
+    key = repr((part.recording.path, part.recording.sha256, part.number, band, settings, weighed))
     if key not in PROCESSED:
-        PROCESSED[key] = Checked.of(pull, band, params, weighed)
+        PROCESSED[key] = process(part, band, params, weighed)
     return PROCESSED[key]
 
 
 @pytest.fixture(scope="module", autouse=True)
 def each_pull_is_processed_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            "sling2sim2real.cli.preflight.check.Checked", SimpleNamespace(of=processed_once)
-        )
+        patch.setattr("sling2sim2real.cli.preflight.check.process", processed_once)
         yield
 
 

@@ -11,7 +11,7 @@ from sling2sim2real.cli.preflight.check import band_of, look_at
 from sling2sim2real.cli.preflight.command import check
 from sling2sim2real.cli.preflight.facts import BandFacts
 from sling2sim2real.cli.preflight.report import CheckReport
-from sling2sim2real.recording.checks.finding import Finding
+from sling2sim2real.recording.checks import Finding
 from tests.hostile import MARKUP
 from tests.project import with_
 from validation.recordings.bag import (
@@ -52,7 +52,7 @@ def test_the_report_of_a_good_recording(looked, seen) -> None:
     assert roles["color"]["rate"] == pytest.approx(15, rel=0.01)
     assert set(content["delays"]) == {"pose", "camera"}
     text = report.to_text()
-    assert "/ft/wrench" in text and "left tip off" in text and "can be used" in text
+    assert "/ft/wrench" in text and "fork tips off" in text and "can be used" in text
 
 
 def test_the_verdict_and_its_cautions_come_first(looked) -> None:
@@ -96,7 +96,7 @@ def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
     write_bag(path, Truth(noise=0.6), rate=500, without=("gripper",), change=edit(wrench=lose))
     report = look_at(path, with_(params, "setup", max_force=15.0), band_of(params)).report
     assert report.usable and report.verdict == "can be used, but:"
-    output = {"gripper", "picture_rate", "force_rate", "gap", "pause", "max_force", "noise"}
+    output = {"gripper", "rate", "gap", "pause", "max_force"}
     assert output <= abouts(report)
     text = report.to_text()
     for caution in report.cautions:

@@ -45,8 +45,10 @@ def test_check_lists_the_pulls_and_looks_at_the_first_that_can_be_used(three, se
         assert f"{row['release_s']:.3f}" in text and row["verdict"].removesuffix(", but:") in text
     assert "empty mask" in content["pulls"][1]["verdict"]
     assert content["signals"]["release_s"] == content["pulls"][2]["release_s"]
-    rest = [caution for caution in content["cautions"] if caution["about"] == "rest"]
-    assert "s after the pull before" in rest[0]["what"]  # its bag hardly waits
+    rest = [
+        caution for caution in content["cautions"] if "after the pull before" in caution["what"]
+    ]
+    assert rest[0]["about"] == "pause"  # its bag hardly waits
     text, status = check(path, params, pull=2)
     assert status == 1 and "pull 2 of 3: cannot be used: empty mask" in text
     with pytest.raises(UserError, match="--pull 4: the last pull in .* is number 3"):

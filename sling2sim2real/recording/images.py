@@ -1,0 +1,231 @@
+"""Pictures to arrays: colour to BGR, depth to metres."""
+
+from __future__ import annotations
+
+import io
+import struct
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from cv2.utils import logging
+from PIL import Image
+
+from sling2sim2real.recording.messages import Picture
+
+FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "BMP", "JPEG2000", "AVIF")  # of what OpenCV unpacks
+KNOWN = "JPEG, PNG, WebP, TIFF, BMP, JPEG 2000 or AVIF"
+JPEG_END = b"\xff\xd9"  # behind it is what a driver sends of its buffer
+LARGEST = 2**24  # pixels; a damaged size must not ask for more memory than this
+
+
+class Undecodable(Exception):
+    """An image that cannot be decoded; the message says why."""
+
+
+class Unsupported(Undecodable):
+    """An image of a kind that is not known, so all of its topic are undecodable."""
+
+
+class Header(NamedTuple):
+    """What the first bytes tell: width and height, Pillow's mode and name of the format."""
+
+    size: tuple[int, int]
+    mode: str
+    format: str
+
+
+def header(data: np.ndarray) -> Header:
+    """Without unpacking. Raises Undecodable."""
+    try:
+        with Image.open(io.BytesIO(data.data), formats=FORMATS) as image:
+            return Header(image.size, image.mode, str(image.format))
+    except Exception as error:  # damaged bytes make Pillow raise anything
+        kind = type(error).__name__  # its words hold addresses, which differ from run to run
+        raise Undecodable(f"damaged image, or neither {KNOWN} ({kind})") from error
+
+
+def unpacked(data: np.ndarray, flags: int, kind: str) -> np.ndarray:
+    """Pixels as `cv2.imdecode` has them; what follows on the picture's end is passed over.
+
+    Args:
+        data: uint8, shape (bytes,).
+        flags: OpenCV's.
+        kind: What the message says that it is.
+
+    Raises:
+        Undecodable: It is damaged, cut off or too large.
+    """
+    (width, height), _, format = header(data)
+    if width * height > LARGEST:
+        raise Undecodable(f"an image of {width} x {height} pixels ({kind})")
+    if format == "JPEG" and JPEG_END not in data.tobytes():  # OpenCV may fill it up with grey
+        raise Undecodable(f"JPEG is cut off ({kind})")
+    if format == "PNG":
+        _expect_whole(data, kind)
+    level = logging.setLogLevel(logging.LOG_LEVEL_SILENT)  # what it would say is said here
+    try:
+        image = cv2.imdecode(data, flags)
+    except cv2.error:
+        image = None
+    finally:
+        logging.setLogLevel(level)
+    if image is None:
+        raise Undecodable(f"damaged {format} ({kind})")
+    return image
+
+
+def _expect_whole(data: np.ndarray, kind: str) -> None:
+    """A PNG's chunks and their checksums, which OpenCV does not look at. Raises Undecodable."""
+    try:
+        with Image.open(io.BytesIO(data.data), formats=("PNG",)) as image:
+            image.verify()
+    except Exception as error:  # damaged bytes make Pillow raise anything
+        raise Undecodable(f"damaged PNG ({kind})") from error
+
+
+__all__ = ["LARGEST", "Undecodable", "Unsupported"]
+
+# compressed_depth_image_transport: format, depth quantisation A and B
+DEPTH_HEADER = struct.Struct("<iff")
+PNG = np.frombuffer(b"\x89PNG\r\n\x1a\n", np.uint8)
+COLORS = {
+    "rgb8": (3, cv2.COLOR_RGB2BGR),
+    "rgba8": (4, cv2.COLOR_RGBA2BGR),
+    "bgra8": (4, cv2.COLOR_BGRA2BGR),
+    "mono8": (1, cv2.COLOR_GRAY2BGR),
+    "8UC1": (1, cv2.COLOR_GRAY2BGR),
+    "mono16": (1, cv2.COLOR_GRAY2BGR),
+    "bgr8": (3, None),
+    "8UC3": (3, None),
+}
+MILLIMETRES = {"16UC1": np.uint16, "mono16": np.uint16, "16SC1": np.int16}
+METRES = {"32FC1": np.float32, "64FC1": np.float64}
+DEPTHS = MILLIMETRES | METRES
+NAMED = tuple(kind for kind in DEPTHS if kind != "mono16")  # which may be infrared
+FARTHEST = 1e6  # m or mm: floats beyond it are no depth
+USE = "use 16UC1 (in millimetres) or 32FC1 (in metres)"
+
+
+def is_depth(picture: Picture) -> bool:
+    """Whether a picture says that it holds depth; a grey PNG of 16 bits is taken to."""
+    if picture.encoding or "compressedDepth" in picture.format:
+        return picture.encoding in NAMED or "compressedDepth" in picture.format
+    if picture.format.startswith(NAMED):
+        return True
+    try:
+        return header(picture.data).mode == "I;16"
+    except Undecodable:
+        return False
+
+
+def color(picture: Picture) -> np.ndarray:
+    """Decode a picture to BGR, shape (H, W, 3), uint8. Raises Undecodable."""
+    if picture.format:
+        if "compressedDepth" in picture.format:
+            raise Unsupported(f"format {picture.format!r} is depth, not colour")
+        return unpacked(picture.data, cv2.IMREAD_COLOR, picture.format)
+    if picture.encoding not in COLORS:
+        raise Unsupported(f"colour encoding {picture.encoding!r} is not known, use rgb8 or bgr8")
+    channels, conversion = COLORS[picture.encoding]
+    pixels = _rows(picture, np.uint16 if picture.encoding == "mono16" else np.uint8, channels)
+    if picture.encoding == "mono16":
+        pixels = (pixels >> 8).astype(np.uint8)
+    return np.ascontiguousarray(pixels) if conversion is None else cv2.cvtColor(pixels, conversion)
+
+
+def depth(picture: Picture) -> np.ndarray:
+    """Decode a picture to metres, shape (H, W), float32, 0 where unknown. Raises Undecodable."""
+    if not picture.format:
+        if picture.encoding not in DEPTHS:
+            raise Unsupported(f"depth encoding {picture.encoding!r} is not known, {USE}")
+        return _metres(_rows(picture, DEPTHS[picture.encoding], 1))
+    floats = picture.format.startswith("32FC1")
+    if "compressedDepth" not in picture.format:
+        pixels = unpacked(picture.data, cv2.IMREAD_UNCHANGED, picture.format)
+        if floats and pixels.dtype != np.float32:
+            raise Unsupported(f"depth format {picture.format!r} is not known, use compressedDepth")
+        return _metres(pixels)
+    body = _body(picture.data)
+    if len(body) == len(picture.data) and floats:
+        raise Unsupported(
+            f"depth format {picture.format!r} without the header of {DEPTH_HEADER.size} bytes that"
+            " says how it is quantised: record the raw depth, or as 16UC1"
+        )
+    if not len(body):
+        raise Undecodable("compressedDepth without a picture")
+    if "rvl" in picture.format.lower():
+        raise Unsupported("compressedDepth in RVL is not read: record it in PNG")
+    packed = unpacked(body, cv2.IMREAD_UNCHANGED, picture.format)
+    if not floats:
+        return _metres(packed)
+    _, scale, offset = DEPTH_HEADER.unpack_from(picture.data.data)
+    with np.errstate(all="ignore"):
+        quantised = np.where(packed > 0, scale / (packed - np.float32(offset)), 0)
+    return _metres(quantised.astype(np.float32))
+
+
+def grey(data: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """A grey PNG of this width and height to uint8, shape (H, W). Raises Undecodable."""
+    try:
+        pixels, mode, format = header(data)
+    except Undecodable as error:
+        raise Undecodable(f"is not a grey PNG of 8 bits or 1: {error}") from error
+    if mode not in ("L", "1") or format != "PNG":
+        raise Undecodable("is not a grey PNG of 8 bits or 1")
+    if pixels != size:
+        raise Undecodable("is of {} x {} pixels, not of {} x {}".format(*pixels, *size))
+    return unpacked(data, cv2.IMREAD_GRAYSCALE, "png")
+
+
+def size_of(picture: Picture) -> tuple[int, int] | None:
+    """Width and height without decoding; None where the header is damaged or not known."""
+    if not picture.format:
+        return picture.width, picture.height
+    data = picture.data
+    if "compressedDepth" in picture.format:
+        data = _body(data)
+    try:
+        return header(data).size
+    except Undecodable:
+        return None
+
+
+def _body(data: np.ndarray) -> np.ndarray:
+    """Return what follows a compressedDepth message's header, which some writers leave out."""
+    return data if np.array_equal(data[: len(PNG)], PNG) else data[DEPTH_HEADER.size :]
+
+
+def _rows(picture: Picture, kind: type, channels: int) -> np.ndarray:
+    """Pixels of a raw picture without the padding at the ends of its rows."""
+    order = np.dtype(kind).newbyteorder(">" if picture.is_bigendian else "<")
+    width, height, step = picture.width, picture.height, picture.step
+    used = width * channels * order.itemsize
+    if not 0 < width * height <= LARGEST:
+        raise Undecodable(f"raw image of {width} x {height} pixels")
+    if step in (0, width, width * channels) and len(picture.data) == height * used:
+        step = used  # drivers leave it out, or count pixels
+    if step < used:
+        raise Undecodable(
+            f"raw image with step {step}: a row of {width} pixels of {picture.encoding} takes"
+            f" {used} bytes"
+        )
+    if len(picture.data) != height * step:
+        raise Undecodable(
+            f"raw image of {len(picture.data)} bytes, {height} rows of {step} were said"
+        )
+    rows = picture.data.reshape(height, step)[:, :used]
+    pixels = np.ascontiguousarray(rows).view(order).astype(kind, copy=False)
+    return pixels if channels == 1 else pixels.reshape(height, width, channels)
+
+
+def _metres(depth: np.ndarray) -> np.ndarray:
+    """Integers of 16 bits hold millimetres, floats hold metres."""
+    if depth.ndim != 2:
+        raise Unsupported("a picture in colour is no depth image")
+    if depth.dtype in MILLIMETRES.values():
+        return np.maximum(depth, 0).astype(np.float32) / 1000
+    if depth.dtype not in METRES.values():
+        raise Unsupported(f"depth image of {depth.dtype}, {USE}")
+    measured = np.isfinite(depth) & (depth > 0) & (depth < FARTHEST)
+    return np.where(measured, depth, 0).astype(np.float32)

@@ -1,1 +1,0 @@
-"""Read an MCAP file's bytes as a `Recording`: any schema, checked, on one clock."""

@@ -1,0 +1,620 @@
+"""Topics to streams on header stamps: read, sorted, on one clock, and what was lost said.
+
+A message has two times: its header's stamp, when it was measured, and log_time, when the recorder
+received it, which is later by a delay that jitters and at times piles up. Everything comes sorted
+by its stamp; log_time is good to some 10 ms and only shows what is wrong with a stamp's clock. What
+it shows is refused or said, with the setting that mends it, and not mended by guesses: delays that
+the recording itself shows are taken out later (`delays`).
+
+A message is lost where it cannot be read, is not finite or absurdly large, has no stamp or one far
+from its neighbours', names another frame than the rest, has the stamp of another, or, of force and
+pose, is alone far off those around it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from sling2sim2real.base.errors import UserError, printable
+from sling2sim2real.recording import images, pace
+from sling2sim2real.recording.camera import Camera
+from sling2sim2real.recording.files import Container, read_container, sha256
+from sling2sim2real.recording.messages import Elsewhere, Picture, Unreadable
+from sling2sim2real.recording.topics import (
+    CAMERAS,
+    OPTIONAL,
+    Choice,
+    camera_of,
+    choose,
+    transforms_of,
+)
+from sling2sim2real.recording.transforms import TransformTree
+from sling2sim2real.recording.words import counted, few, shortened
+from sling2sim2real.settings.lab import SetupParams
+from sling2sim2real.settings.recording import DelayParams
+
+STREAMS = ("wrench", "pose", "gripper", *CAMERAS)
+ABSURD = 1e6  # N, m, m/s, rad: nothing here is as large
+TIMED = ("gripper",)  # roles for which log_time will do
+# What a lone message may be off the four around it: a knock or a fall lasts for more than one.
+LONE = {"wrench": 30.0, "pose": 0.05}  # N, m
+MOST_LONE = 0.05  # share of the messages that may be alone: more are the sensor's noise, or units
+FASTEST = 2.0  # m/s of the hand
+LONG_GAP, LONG_GAP_S = 5.0, 0.02  # periods and seconds from which a gap is named
+ENDS = 0.3  # s by which a topic may start later or stop earlier than the others
+SHOWN = 3  # places named in one line, losses in an error
+REASON, LOSS, LINE = 100, 300, 1000  # characters: why a message is damaged, a loss, an error
+# Clocks
+FAR = 1.0  # s from a stamp to those around it: it is damage
+ALONE, FEW = 60.0, 3  # s from fewer messages than so at a topic's end to the rest: so are they
+SET_BACK = 0.01  # s by which both times of a message go back where a clock was set,
+DISORDER = 10  # but nobody sets a clock so often: the file has no order
+INTERLEAVED = 6  # times that two runs of messages alternate which cover the same time
+TOLERANCE = 0.5  # s between the clocks of two topics: transport and drivers take less
+SECONDS = 5  # of least delays: fewer tell nothing of a clock's course
+
+Values = TypeVar("Values", bound=Any)
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True)
+class Clock:
+    """How a topic's clock goes against the wrench's, by the least delays of receipt.
+
+    Attributes:
+        change, error: Of its lead from the start of the recording to the end, and the standard
+            error [s].
+        step: When it steps [s of log_time since the first]; None where it drifts steadily.
+    """
+
+    change: float = 0.0
+    error: float = np.inf
+    step: float | None = None
+
+
+class Pictures(Sequence[Picture]):
+    """Pictures of a topic, each of which is read when it is asked for."""
+
+    def __init__(self, choice: Choice, places: np.ndarray) -> None:
+        self._choice, self._places = choice, places
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __getitem__(self, number: Any) -> Any:
+        if isinstance(number, slice | np.ndarray):
+            return Pictures(self._choice, self._places[number])
+        return self._choice.read(self._choice.channel.payloads[self._places[number]]).value
+
+
+@dataclass(frozen=True)
+class Stream(Generic[Values]):
+    """One topic, sorted by stamp.
+
+    Attributes:
+        topic: Its name.
+        frame: frame_id of its messages.
+        stamp: header.stamp, ns, shape (S,), strictly increasing.
+        values: One column a quantity, shape (S, C), or `Pictures`, length S.
+        receipt_delay: Median of log_time - stamp [s].
+        lost: Messages that are not in it, for whatever reason.
+        notes: What was lost or mended, in words.
+        bursts: In which the stamps came; None where they were even.
+        hold: For how long each value was repeated [s], 0 where it was not: repeats are left out.
+        clock: Against the wrench's, by the times of receipt.
+    """
+
+    topic: str
+    frame: str
+    stamp: np.ndarray
+    values: Values
+    receipt_delay: float
+    lost: int
+    notes: list[str] = field(default_factory=list)
+    bursts: pace.Bursts | None = None
+    hold: float = 0.0
+    clock: Clock = Clock()
+
+    def seconds(self, origin: int) -> np.ndarray:
+        return (self.stamp - origin) * 1e-9
+
+    @property
+    def period(self) -> float:
+        """Usual time between messages [s]: the median, or where that is none, the mean."""
+        return pace.period_of(np.diff(self.stamp)) * 1e-9
+
+    @property
+    def longest_gap(self) -> float:
+        return float(np.max(np.diff(self.stamp))) * 1e-9
+
+    @property
+    def missing(self) -> int:
+        """Messages that a constant rate would have had in the gaps."""
+        gaps = np.diff(self.stamp) * 1e-9 / self.period
+        return int(np.sum(np.maximum(np.round(gaps) - 1, 0)))
+
+    def between(self, first: int, last: int) -> Stream[Values]:
+        """Messages stamped from `first` to `last` [ns]; the nearest two where there are fewer."""
+        begin = min(int(np.searchsorted(self.stamp, first)), len(self.stamp) - 2)
+        end = max(int(np.searchsorted(self.stamp, last, side="right")), begin + 2)
+        return replace(self, stamp=self.stamp[begin:end], values=self.values[begin:end])
+
+    def shifted(self, seconds: float) -> Stream[Values]:
+        """Copy with `seconds` subtracted from every stamp."""
+        return replace(self, stamp=self.stamp - round(seconds * 1e9)) if seconds else self
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What was read of one file, or the part of it that one of its pulls takes.
+
+    Attributes:
+        wrench: Force [N] in `wrench.frame`, values (S, 3).
+        pose: Position [m] and quaternion xyzw in `pose.frame`, values (S, 7).
+        gripper: Sum of the finger positions, as they are reported [m], values (S, 1); None where
+            not recorded.
+        color, depth: `Pictures`, decoded by `images`.
+        color_camera, depth_camera: Their intrinsics.
+        transforms: The static tree.
+        losses: What was lost of the file or mended in it, in words.
+        notes: What else to know of it, which cost nothing.
+        choices: Why each role has its topic.
+        sha256: Hash of the file.
+        start: From which seconds count [ns]: the file's first force, also in a part of it; None
+            for that of `wrench`.
+        late: By what the stamps of a role were given to be late [s], and are not any more.
+    """
+
+    path: Path
+    wrench: Stream[np.ndarray]
+    pose: Stream[np.ndarray]
+    gripper: Stream[np.ndarray] | None
+    color: Stream[Sequence[Picture]]
+    depth: Stream[Sequence[Picture]]
+    color_camera: Camera
+    depth_camera: Camera
+    transforms: TransformTree
+    losses: list[str] = field(default_factory=list)
+    sha256: str = ""
+    notes: list[str] = field(default_factory=list)
+    choices: dict[str, str] = field(default_factory=dict)
+    start: int | None = None
+    late: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def origin(self) -> int:
+        """Stamp from which seconds count [ns]."""
+        return int(self.wrench.stamp[0]) if self.start is None else self.start
+
+    @property
+    def streams(self) -> dict[str, Stream[Any]]:
+        by_role = {role: getattr(self, role) for role in STREAMS}
+        return {role: stream for role, stream in by_role.items() if stream}
+
+    def depth_picture(self, number: int) -> np.ndarray | None:
+        """Depth [m], 0 where unknown, of the camera's size (H, W); None where it is damaged."""
+        try:
+            depth = images.depth(self.depth.values[number])
+        except images.Undecodable:
+            return None
+        return depth if depth.shape == (self.depth_camera.height, self.depth_camera.width) else None
+
+    def part(self, begin: float, end: float) -> Recording:
+        """What was recorded from `begin` to `end` [s]."""
+        first, last = (self.origin + round(time * 1e9) for time in (begin, end))
+        cut = {role: stream.between(first, last) for role, stream in self.streams.items()}
+        return replace(self, **cut, start=self.origin)
+
+    def shifted(self, pose: float = 0.0, camera: float = 0.0) -> Recording:
+        """Copy with stamps that are late by so many seconds put right."""
+        return replace(
+            self,
+            pose=self.pose.shifted(pose),
+            color=self.color.shifted(camera),
+            depth=self.depth.shifted(camera),
+        )
+
+
+def read_recording(path: Path, setup: SetupParams, delays: DelayParams | None = None) -> Recording:
+    """Read and check a recording. Raises UserError with one line about what is missing or wrong.
+
+    Args:
+        delays: By what stamps are known to be late [s]: taken off before clocks are compared.
+    """
+    return recording_of(read_container(Path(path)), setup, delays)
+
+
+def recording_of(
+    container: Container, setup: SetupParams, delays: DelayParams | None = None
+) -> Recording:
+    """Do what `read_recording` does, from a file that was read already."""
+    try:
+        transforms = transforms_of(container)
+        chosen = choose(container, setup, transforms)
+        color_camera, depth_camera = (camera_of(chosen, role) for role in CAMERAS)
+        by_role = {role: chosen[role] for role in STREAMS if role in chosen}
+        late = late_by(delays)
+        streams, remarks = streams_of(by_role, late)
+    except UserError as error:
+        raise explained(error, container.path, container.losses) from None
+    lost = [f"{stream.topic}: {note}" for stream in streams.values() for note in stream.notes]
+    return Recording(
+        path=container.path,
+        wrench=streams["wrench"],
+        pose=streams["pose"],
+        gripper=streams.get("gripper"),
+        color=streams["color"],
+        depth=streams["depth"],
+        color_camera=color_camera,
+        depth_camera=depth_camera,
+        transforms=transforms,
+        losses=[*container.losses, *lost],
+        notes=[*container.notes, *remarks],
+        choices={role: choice.why for role, choice in chosen.items()},
+        sha256=sha256(container.path),
+        late={role: seconds for role, seconds in late.items() if role in streams},
+    )
+
+
+def late_by(delays: DelayParams | None) -> dict[str, float]:
+    """Seconds by which the stamps of each role are given to be late; none where nothing is."""
+    given = {"pose": delays and delays.pose, "camera": delays and delays.camera}
+    roles = {"pose": ("pose",), "camera": CAMERAS}
+    return {role: late for name, late in given.items() if late for role in roles[name]}
+
+
+def explained(error: UserError, path: Path, losses: list[str], pull: str = "") -> UserError:
+    """The error with the file's name, the pull, and with what was lost, which may be its cause."""
+    text = str(error).removeprefix(f"{path}: ")
+    text = shortened(f"{pull}: {text}" if pull else text, LINE)
+    text = text if str(path) in text else f"{path}: {text}"
+    shown = [shortened(loss, LOSS) for loss in losses[:SHOWN]]
+    shown += ["and more"] * (len(losses) > SHOWN)
+    return UserError(printable(f"{text} ({'; '.join(shown)})" if losses else text))
+
+
+def streams_of(
+    chosen: dict[str, Choice], late: Mapping[str, float] | None = None
+) -> tuple[dict[str, Stream[Any]], list[str]]:
+    """All topics on the wrench's clock, and remarks on what costs nothing.
+
+    Args:
+        chosen: Choices of wrench, pose, color, depth, and of gripper if there is one.
+        late: By what the stamps of a role are known to be late [s], which is taken off.
+
+    Raises:
+        UserError: for a topic that cannot be used, in one line.
+    """
+    notes: list[str] = []
+    readers = {role: partial(_read, role, choice) for role, choice in chosen.items()}
+    topics = _usable(readers, notes)
+    for role, raw in topics.items():
+        raw.arrive()
+        raw.stamp = raw.stamp - round((late or {}).get(role, 0.0) * 1e9)
+    _expect_one_clock(topics, late or {})
+    streams = _usable({role: partial(_sorted, raw) for role, raw in topics.items()}, notes)
+    wrench = topics["wrench"]
+    for role in set(streams) - {"wrench", *TIMED}:
+        clock = _course(topics[role], wrench)
+        streams[role] = replace(streams[role], clock=clock)
+    origin = int(streams["wrench"].stamp[0])
+    first = min(stream.stamp[0] for stream in streams.values())
+    last = max(stream.stamp[-1] for stream in streams.values())
+    for stream in streams.values():
+        stream.notes.extend(_gaps(stream, origin, first, last))
+    return streams, notes
+
+
+def _usable(made: Mapping[str, Callable[[], Value]], notes: list[str]) -> dict[str, Value]:
+    """What is made of each role, without the optional roles of which nothing can be made."""
+    results = {}
+    for role, make in made.items():
+        try:
+            results[role] = make()
+        except UserError as error:
+            if role not in OPTIONAL:
+                raise
+            notes.append(f"{error}: done without it")
+    return results
+
+
+@dataclass
+class _Raw:
+    """One topic as it was read, in the order of the file.
+
+    Attributes:
+        values: Shape (S, C); of pictures their places in the file.
+        reason: Why the first damaged message cannot be read.
+    """
+
+    role: str
+    choice: Choice
+    frame: str
+    stamp: np.ndarray
+    log: np.ndarray
+    values: np.ndarray
+    lost: Counter[str]
+    reason: str = ""
+    notes: list[str] = field(default_factory=list)
+    disorder: int = 0
+    bursts: pace.Bursts | None = None
+
+    @property
+    def topic(self) -> str:
+        return self.choice.channel.topic
+
+    def keep(self, which: np.ndarray) -> None:
+        """Only these messages: a mask or an order."""
+        self.stamp, self.log, self.values = self.stamp[which], self.log[which], self.values[which]
+
+    def drop(self, which: np.ndarray, why: str) -> None:
+        if which.any():
+            self.lost[why] += int(which.sum())
+            self.keep(~which)
+
+    def words(self) -> str:
+        """How many messages were lost, and why."""
+        words = ", ".join(f"{count} {why}" for why, count in sorted(self.lost.items()))
+        return f"{words}; the first damaged one: {self.reason}" if self.reason else words
+
+    def arrive(self) -> None:
+        """Put messages in the order in which they came, without stamps that are damage, evenly.
+
+        Raises UserError where the machine's clock was set back.
+        """
+        back = _back(self.stamp, self.log)
+        if len(back) < DISORDER:
+            for i in back:
+                self._expect_not_set_back(int(i))
+        if len(back):  # chunks are in disorder
+            self.keep(np.argsort(self.log, kind="stable"))
+        self.disorder = int(np.count_nonzero(np.diff(self.stamp) < 0))
+        self.drop(_outliers(self.stamp, self.log), "far off in time")
+        if self.role in CAMERAS:
+            return
+        even = pace.without_bursts(self.stamp, self.log, self.values)
+        if even is not None:
+            self.stamp, self.bursts = even
+            self.disorder = 0
+            every = f"{self.bursts.interval * 1e-6:.3g} ms"
+            side = "before" if self.bursts.before else "after"
+            self.notes.append(
+                f"stamped in bursts of {self.bursts.count} every {every}: spread evenly over the"
+                f" time {side} each"
+            )
+
+    def _expect_not_set_back(self, i: int) -> None:
+        """Chunks in another order go back too, but do not cover the same time twice."""
+        stamp = self.stamp
+        before, after = stamp[:i][stamp[:i] >= stamp[i]], stamp[i:][stamp[i:] <= stamp[i - 1]]
+        run = np.repeat([0, 1], [len(before), len(after)])
+        order = np.argsort(np.concatenate([before, after]), kind="stable")
+        if np.count_nonzero(np.diff(run[order])) >= INTERLEAVED:
+            size, at = (stamp[i - 1] - stamp[i]) * 1e-9, (stamp[i - 1] - stamp[0]) * 1e-9
+            raise UserError(
+                f"the clock of the machine was set back by {size:.3f} s after {at:.2f} s of"
+                f" {self.topic}: record again without setting clocks"
+            )
+
+
+def _read(role: str, choice: Choice) -> _Raw:
+    """Read a topic's messages. Raises UserError where fewer than two are left."""
+    stamps, logs, values, frames, lost = [], [], [], [], Counter()
+    seen, bare, reason = set(), 0, ""
+    channel = choice.channel
+    for place, (log_time, payload) in enumerate(
+        zip(channel.log_times, channel.payloads, strict=True)
+    ):
+        try:
+            stamp, frame, value = choice.read(payload)
+        except Elsewhere:
+            continue
+        except Unreadable as error:
+            lost["damaged"] += 1
+            reason = reason or shortened(printable(str(error)), REASON)
+            continue
+        if (log_time, hash(payload)) in seen:
+            lost["doubled"] += 1
+            continue
+        seen.add((log_time, hash(payload)))
+        if isinstance(value, Picture):
+            value = place
+        elif not all(abs(x) < ABSURD for x in value):
+            lost["not finite"] += 1
+            continue
+        bare += not stamp
+        stamps.append(stamp or 0)
+        logs.append(log_time)
+        values.append(value)
+        frames.append(frame)
+    frame = Counter(frames).most_common(1)[0][0] if frames else ""
+    stamp, log = np.array(stamps, np.int64), np.array(logs, np.uint64).astype(np.int64)
+    raw = _Raw(role, choice, frame, stamp, log, np.array(values), lost, reason)
+    if bare == len(stamps) > 0:
+        if role not in TIMED:
+            raise UserError(f"topic {raw.topic} has no header stamps, record with time stamps")
+        raw.stamp = log.copy()
+        raw.notes.append("no header stamps: log_time is used")
+    raw.drop(np.array([other != frame for other in frames], bool), "in another frame")
+    raw.drop(raw.stamp == 0, "without a stamp")
+    _expect_some(raw)
+    return raw
+
+
+def _expect_some(raw: _Raw) -> None:
+    if len(raw.stamp) < 2:
+        reasons = f" ({raw.words()})" if raw.lost else ""
+        raise UserError(f"topic {raw.topic} has fewer than two readable messages{reasons}")
+
+
+def _sorted(raw: _Raw) -> Stream[Any]:
+    if raw.disorder > 0:
+        raw.notes.append(f"{counted(raw.disorder)} out of order, sorted by stamp")
+    raw.keep(np.argsort(raw.stamp, kind="stable"))
+    raw.drop(np.diff(raw.stamp, prepend=raw.stamp[0] - 1) == 0, "with the stamp of another")
+    _expect_some(raw)
+    values: Any = Pictures(raw.choice, raw.values)
+    hold = None
+    if raw.role not in CAMERAS:
+        if raw.role in LONE and raw.choice.convert is None:
+            raw.drop(_lone(raw), "far off those around")
+        values = raw.values.astype(float)
+        if raw.choice.convert is not None:
+            values = raw.choice.convert(values)
+        hold = pace.hold_of(raw.stamp, values) if raw.role in LONE else None
+    if hold:
+        retained = pace.first_of_each(raw.stamp, values, hold)
+        times = f"{len(values) / np.count_nonzero(retained):.0f}"
+        raw.notes.append(f"each value is sent {times} times: the repeats are left out")
+        raw.keep(retained)
+        values = values[retained]
+    if raw.lost:
+        raw.notes.append(f"lost {raw.words()}")
+    delay = float(np.median(raw.log - raw.stamp) * 1e-9)
+    lost, hold = sum(raw.lost.values()), (hold or 0.0) * 1e-9
+    return Stream(raw.topic, raw.frame, raw.stamp, values, delay, lost, raw.notes, raw.bursts, hold)
+
+
+def _lone(raw: _Raw) -> np.ndarray:
+    """Single values of force or place far from those around them, shape (S,).
+
+    By a running median of five, as Hampel's filter, with a fixed limit.
+    """
+    values = raw.values[:, :3]
+    limit = LONE[raw.role]
+    if raw.role == "pose":
+        limit = max(limit, FASTEST * 1e-9 * float(np.median(np.diff(raw.stamp))))
+    around = median_filter(values, (5, 1), mode="nearest")
+    lone = np.abs(values - around).max(axis=1) > limit
+    return lone if lone.mean() <= MOST_LONE else np.zeros(len(lone), bool)
+
+
+def _gaps(stream: Stream[Any], origin: int, first: int, last: int) -> list[str]:
+    """Long gaps, and ends that lack what the other topics have."""
+    notes, ways = [], np.diff(stream.stamp) * 1e-9
+    late, early = (stream.stamp[0] - first) * 1e-9, (last - stream.stamp[-1]) * 1e-9
+    least = max(ENDS, LONG_GAP * stream.period)
+    if late > least:
+        notes.append(f"starts {late:.2f} s after the others")
+    if early > least:
+        notes.append(f"stops {early:.2f} s before the others")
+    long = np.flatnonzero(ways > max(LONG_GAP * stream.period, LONG_GAP_S))
+    if len(long):
+        at = stream.seconds(origin)
+        named = [f"{ways[i]:.3f} s at {at[i]:.2f} s" for i in long[np.argsort(-ways[long])]]
+        notes.append(f"gap{'s' * (len(long) > 1)} of {few(named, SHOWN)}")
+    return notes
+
+
+def _outliers(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
+    """Which stamps [ns], in the order of arrival, are far from all around them; shape (S,).
+
+    By a running median of five, as Hampel's filter, with a fixed limit. At the ends of a topic
+    these are also one or two that log_time has elsewhere, or that come a minute before or after all
+    others: too few to tell of a clock.
+    """
+    if len(stamp) < 5:
+        return np.zeros(len(stamp), bool)
+    middle = np.median(stamp.astype(float))
+    usual = median_filter(stamp - middle, 5, mode="nearest") + middle
+    ways = np.diff(stamp)
+    limit = max(FAR * 1e9, 10 * float(np.median(ways[ways > 0])) if (ways > 0).any() else 0.0)
+    far_off = np.abs(stamp - usual) > limit
+    for order in (1, -1):
+        retained = np.flatnonzero(~far_off)[::order]
+        ways, by_log = np.abs(np.diff(stamp[retained])), np.abs(np.diff(log[retained]))
+        elsewhere = np.abs(ways - by_log) > limit / 2
+        far = ways > np.where(elsewhere, limit, max(ALONE * 1e9, limit))
+        begin = 0
+        for i in np.flatnonzero(far[: 2 * FEW]):
+            if i + 1 - begin >= FEW or 2 * i > len(retained):
+                break
+            begin = i + 1
+        far_off[retained[:begin]] = True
+    return far_off
+
+
+def _back(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
+    """Messages at which both times go back, by about as much."""
+    way, way_by_log = np.diff(stamp), np.diff(log)
+    both = np.maximum(way, way_by_log) < -SET_BACK * 1e9
+    return np.flatnonzero(both & (np.abs(way - way_by_log) < -way_by_log / 2)) + 1
+
+
+def _least(raw: _Raw, start: int) -> dict[int, int]:
+    """Least delay of receipt in each second of log_time [ns]."""
+    second, delay = (raw.log - start) // 10**9, raw.log - raw.stamp
+    order = np.lexsort([delay, second])
+    keys, first = np.unique(second[order], return_index=True)
+    return dict(zip(keys.tolist(), delay[order][first].tolist(), strict=True))
+
+
+def _leads(raw: _Raw, wrench: _Raw) -> tuple[np.ndarray, np.ndarray]:
+    """Seconds in which both have messages, and the excess of the least delays then [s]."""
+    start = int(min(raw.log.min(), wrench.log.min()))
+    mine, others = _least(raw, start), _least(wrench, start)
+    common = np.array(sorted({*mine} & {*others}))
+    return common, np.array([mine[k] - others[k] for k in common]) * 1e-9
+
+
+def _expect_one_clock(topics: dict[str, _Raw], late: Mapping[str, float]) -> None:
+    """Raises UserError about the topic whose clock is furthest from the median of all topics'.
+
+    A gripper on another clock is read by log_time.
+    """
+    wrench, offsets = topics["wrench"], {}
+    for role, raw in topics.items():
+        leads = _leads(raw, wrench)[1]
+        alone = (raw.log - raw.stamp).min() - (wrench.log - wrench.stamp).min()
+        offsets[role] = float(np.median(leads)) if len(leads) else float(alone) * 1e-9
+    middle = float(np.median(list(offsets.values())))
+    for role in TIMED:
+        if role in topics and abs(offsets.pop(role)) > TOLERANCE:
+            topics[role].stamp = topics[role].log.copy()
+            topics[role].notes.append("on another clock: log_time is used")
+    off = {role: middle - offset for role, offset in offsets.items()}
+    if np.ptp(list(off.values())) <= TOLERANCE:
+        return
+    worst = max(off, key=lambda role: abs(off[role]))
+    names, roles = {"pose": ["pose"], "camera": CAMERAS}, []
+    for name in names:
+        seen = [late.get(role, 0.0) - offsets[role] for role in names[name]]
+        if np.ptp(seen) < TOLERANCE and max(map(abs, seen)) > TOLERANCE / 2:
+            roles.append(f"episode.delays.{name}: {np.mean(seen):.3f}")
+    cure = ""
+    if roles:
+        cure = f"; or set {' and '.join(roles)} in params.yaml, by the times of receipt, which is"
+        cure += " good to some hundredths of a second alone"
+    raise UserError(
+        f"the stamps of {topics[worst].topic} are {off[worst]:+.3f} s off the other topics' clock,"
+        f" record all topics with one clock{cure}"
+    )
+
+
+def _course(raw: _Raw, wrench: _Raw) -> Clock:
+    """How a clock goes against the wrench's: a line or a step, whichever fits better."""
+    time, lead = _leads(raw, wrench)
+    count = len(time)
+    if count < SECONDS:
+        return Clock()
+    slope, start = np.polyfit(time, lead, 1)
+    left = np.sum((lead - start - slope * time) ** 2)
+    error = np.sqrt(left / (count - 2) / np.sum((time - time.mean()) ** 2))
+    span = float(np.ptp(wrench.stamp)) * 1e-9
+    best = Clock(-float(slope) * span, float(error) * span)
+    for k in range(2, count - 1):
+        parts = lead[:k], lead[k:]
+        rest = sum(float(np.sum((part - part.mean()) ** 2)) for part in parts)
+        if rest < left:
+            left = rest
+            scatter = np.sqrt(rest / (count - 2) * (1 / k + 1 / (count - k)))
+            best = Clock(-float(parts[1].mean() - parts[0].mean()), float(scatter), float(time[k]))
+    return best

@@ -1,0 +1,238 @@
+"""Clocks: offsets, steps and drifts that were put in are refused or said; good ones are left."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.checks import of_topics
+from sling2sim2real.recording.delays import correct_delays
+from sling2sim2real.recording.messages import NO_SCHEMA, Channel
+from sling2sim2real.recording.streams import Recording, _course, _Raw, read_recording
+from sling2sim2real.recording.topics import Choice
+from tests.project import with_
+from tests.recording.conftest import part_of, pull_of
+from validation.recordings.bag import START, Truth, blind_bag, edit, head
+
+MS = 1_000_000
+LONG = Truth(end=7.0)
+
+
+def topic(
+    rate: float, seconds: float = 6.0, *, seed: int = 0, jitter: float = 0.02, delay: float = 3e-4
+) -> tuple[np.ndarray, np.ndarray]:
+    """Stamps and log_times [ns]: an even rate, exponential delays."""
+    random = np.random.default_rng(seed)
+    k = np.arange(int(seconds * rate))
+    stamp = START + np.round(1e9 * (k + jitter * random.normal(size=len(k))) / rate).astype(int)
+    late = delay + random.exponential(delay, len(k))
+    # The recorder writes as it receives.
+    return stamp, np.maximum.accumulate(stamp + np.round(1e9 * late).astype(int))
+
+
+def test_chunks_in_another_order_or_in_none_are_no_set_clock() -> None:
+    stamp, log = topic(1000.0, seed=7)
+    chunks = np.r_[0:1000, 3000:4000, 2000:3000, 1000:2000, 4000:6000]
+    for order in (chunks, np.random.default_rng(1).permutation(6000)):
+        raw = raw_of(stamp[order], log[order])
+        raw.arrive()
+        assert np.abs(order[raw.values[:, 0]] - np.arange(6000)).max() < 5
+        assert not raw.lost
+
+
+def test_stamps_far_from_all_others() -> None:
+    stamp, log = topic(200.0, seed=8)
+    stamp[[100, 500, 501]] += np.array([10**15, -(10**18), 5 * 10**9])
+    raw = raw_of(stamp, log)
+    raw.arrive()
+    assert raw.lost == {"far off in time": 3}
+    assert not {100, 500, 501} & {*raw.values[:, 0]}
+
+
+@pytest.mark.parametrize("rate", [-3e-3, 0.0, 5e-4])
+def test_a_drift_is_told_by_the_least_delays(rate) -> None:
+    for seed in range(5):
+        stamp, log = topic(1000.0, 9.0, seed=seed)
+        odd = START + np.round((stamp - START) * (1 + rate)).astype(np.int64)
+        clock = _course(raw_of(odd, log), raw_of(*topic(1000.0, 9.0, seed=seed + 10)))
+        assert clock.change == pytest.approx(9 * rate, abs=max(5 * clock.error, 2e-4))
+        assert clock.step is None or abs(clock.change) < 2e-4
+    assert _course(raw_of(stamp[:1000], log[:1000]), raw_of(stamp, log)).error == np.inf
+
+
+@pytest.mark.parametrize("size", [-0.06, 0.005, 0.06])
+def test_a_step_is_no_drift(size) -> None:
+    stamp, log = topic(1000.0, 9.0, seed=3)
+    stamp[4000:] += round(1e9 * size)
+    clock = _course(raw_of(stamp, log), raw_of(*topic(1000.0, 9.0)))
+    assert clock.step == 4 and clock.change == pytest.approx(size, rel=0.05)
+    assert clock.error < 0.001
+
+
+def raw_of(stamp: np.ndarray, log: np.ndarray) -> _Raw:
+    """A topic whose values are its messages' numbers."""
+    values = np.arange(len(stamp))[:, None]
+    choice = Choice(Channel("/x", NO_SCHEMA, ""), lambda payload: None)
+    return _Raw("pose", choice, "", stamp.copy(), log.copy(), values, Counter())
+
+
+def read(folder, params, **options) -> Recording:
+    return read_recording(blind_bag(folder, **options), params.setup)
+
+
+def shift(*kinds: str, by: float, since: float = -1.0, until: float = 1e9):
+    """A `change` for write_bag: these topics' stamps, between two times, by so many seconds."""
+
+    def moved(stamp: int, message) -> None:
+        if since <= (stamp - START) * 1e-9 < until:
+            message.header = head(stamp + round(by * 1e9), message.header.frame_id)
+
+    return edit(**dict.fromkeys(kinds, moved))
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory, params) -> Recording:
+    return read(tmp_path_factory.mktemp("clock"), params)
+
+
+def test_nothing_is_said_of_a_good_file(good) -> None:
+    assert good.losses == []
+    assert all(stream.notes == [] for stream in good.streams.values())
+
+
+def test_a_gripper_on_another_clock_is_read_by_log_time(tmp_path, params, good) -> None:
+    recording = read(tmp_path, params, change=shift("gripper", by=-3600.0))
+    assert np.abs(recording.gripper.stamp - good.gripper.stamp).max() < 20 * MS
+    np.testing.assert_array_equal(recording.gripper.values, good.gripper.values)
+    assert recording.losses == ["/gripper/joint_states: on another clock: log_time is used"]
+
+
+@pytest.mark.parametrize(
+    ("kinds", "named"),
+    [
+        (("color",), "/camera/color/compressed are -40.0"),
+        (("color", "depth", "info"), "/camera/"),
+        (("wrench",), "/ft/wrench are -39.9"),
+        (("pose",), r"/arm/current_pose are -39.9.* episode.delays.pose: -40.0"),
+    ],
+)
+def test_another_clock_is_refused_with_the_setting_that_mends_it(
+    tmp_path, params, kinds, named
+) -> None:
+    with pytest.raises(UserError, match=named) as caught:
+        read(tmp_path, params, change=shift(*kinds, by=-40.0))
+    assert "record all topics with one clock" in str(caught.value)
+
+
+def test_log_time_on_a_clock_of_its_own_or_with_a_step_does_no_harm(tmp_path, params, good) -> None:
+    for by, since in ((-1e6, -1.0), (0.9, 2.0), (-0.9, 2.0)):
+
+        def receive(kind, t, delay, by=by, since=since):
+            return t + delay + by * (t > since)
+
+        recording = read(tmp_path, params, receive=receive)
+        for role, stream in recording.streams.items():
+            np.testing.assert_array_equal(stream.stamp, good.streams[role].stamp)
+        assert recording.losses == []
+
+
+def test_messages_out_of_order_are_sorted_and_said(tmp_path, params, good) -> None:
+    recording = read(tmp_path, params, change=shift("pose", by=-0.012, since=2, until=2.005))
+    assert recording.losses == ["/arm/current_pose: 1 message out of order, sorted by stamp"]
+    assert np.all(np.diff(recording.pose.stamp) > 0)
+    assert len(recording.pose.stamp) == len(good.pose.stamp)
+
+
+@pytest.mark.parametrize("kind", ["wrench", "pose", "depth"])
+def test_a_step_in_one_topic_is_refused_by_its_name(tmp_path, params, kind) -> None:
+    """Whose clock stepped a comparison of two cannot tell: all against the force's."""
+    path = blind_bag(tmp_path, LONG, change=shift(kind, by=0.3, since=3.0))
+    found = [*of_topics(part_of(read_recording(path, params.setup), params))]
+    words = [str(finding) for finding in found if finding.about == "clock" and finding.refused]
+    topics = {"wrench": "/arm/current_pose", "pose": "/arm/current_pose", "depth": "/camera/depth"}
+    assert any(topics[kind] in what and "steps by" in what for what in words)
+
+
+def test_a_step_in_all_topics_keeps_them_together(tmp_path, params, good) -> None:
+    kinds = ("wrench", "pose", "gripper", "color", "depth", "info")
+    recording = read(tmp_path, params, change=shift(*kinds, by=0.8, since=2.0))
+    assert not [f for f in of_topics(part_of(recording, params)) if f.about == "clock"]
+    for role, stream in recording.streams.items():
+        off = stream.stamp - good.streams[role].stamp
+        assert np.ptp(off) < 801 * MS, role
+
+
+def test_the_machine_clock_that_is_set_back_is_refused(tmp_path, params) -> None:
+    kinds = ("wrench", "pose", "gripper", "color", "depth", "info")
+    with pytest.raises(UserError, match="was set back by 0.79. s after 2.00 s of /ft/wrench"):
+        read(
+            tmp_path,
+            params,
+            change=shift(*kinds, by=-0.80037, since=2.0),
+            receive=lambda kind, t, delay: t + delay - 0.80037 * (t >= 2.0),
+        )
+
+
+def test_gaps_and_ends_are_said(tmp_path, params) -> None:
+    def lose(stamp: int, message) -> None:
+        if 0.8 <= (stamp - START) * 1e-9 < 0.9:
+            message.wrench.force.x = float("nan")
+
+    def outside(low: float, high: float):
+        return lambda stamp, message: not low < (stamp - START) * 1e-9 < high
+
+    gone = {"pose": outside(3.5, 9.0), "color": outside(1.0, 1.6), "gripper": outside(-1.0, 0.6)}
+    recording = read(tmp_path, params, change=edit(wrench=lose, **gone))
+    words = "\n".join(recording.losses)
+    assert "/ft/wrench: lost 50 not finite" in words
+    assert "/ft/wrench: gap of 0.102 s at 0.80 s" in words
+    assert "/arm/current_pose: stops 0.70 s before the others" in words
+    assert "/gripper/joint_states: starts 0.60 s after the others" in words
+    assert "/camera/color/compressed: gap of 0.667 s at 0.94 s" in words
+    assert recording.wrench.lost == 50 and np.isfinite(recording.wrench.values).all()
+
+
+def test_stamps_that_are_missing(tmp_path, params, good) -> None:
+    def zero(part: int):
+        def bare(stamp: int, message) -> None:
+            if stamp % 10**9 % part == 0:
+                message.header = head(0)
+
+        return edit(wrench=bare)
+
+    some = read(tmp_path, params, change=zero(100 * MS))
+    assert any("without a stamp" in loss for loss in some.losses)
+    assert len(some.wrench.stamp) + some.wrench.lost == len(good.wrench.stamp)
+    with pytest.raises(UserError, match="/ft/wrench has no header stamps"):
+        read(tmp_path, params, change=zero(1))
+
+
+def test_shifted_puts_late_stamps_right(good) -> None:
+    shifted = good.shifted(pose=0.004, camera=-0.010)
+    for role, by in (("pose", 4), ("color", -10), ("depth", -10), ("wrench", 0), ("gripper", 0)):
+        off = good.streams[role].stamp - shifted.streams[role].stamp
+        np.testing.assert_array_equal(off, by * MS)
+
+
+@pytest.mark.parametrize("late", [-2.8, 0.66, 1000.0])
+def test_a_given_delay_is_taken_off_first(tmp_path, params, good, late) -> None:
+    """The refusal says which, to some hundredths of a second."""
+    path = blind_bag(tmp_path, change=shift("color", "depth", by=late))
+    with pytest.raises(UserError, match=r"episode\.delays\.camera: (\S+) in params") as caught:
+        read_recording(path, params.setup)
+    summary = float(str(caught.value).partition("camera: ")[2].split()[0])
+    assert summary == pytest.approx(late, abs=0.05)
+    for camera in (late, summary):
+        given = with_(params, "episode.delays", camera=camera)
+        recording = read_recording(path, params.setup, given.episode.delays)
+        assert recording.late == {"color": camera, "depth": camera}
+        off = recording.depth.stamp - good.depth.stamp
+        np.testing.assert_allclose(off * 1e-9, late - camera, atol=1e-9)
+        right, output = correct_delays(pull_of(recording, params), given)
+        assert output.camera.applied and output.camera.value == camera
+        np.testing.assert_array_equal(
+            right.recording.depth.stamp, recording.depth.stamp
+        )  # not twice

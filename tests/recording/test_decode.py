@@ -1,0 +1,186 @@
+"""Every pair of encodings, from bytes of another library or by the format's specification."""
+
+from __future__ import annotations
+
+import json
+import struct
+from types import SimpleNamespace
+
+import pytest
+import zstandard
+from foxglove import messages as fox
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from mcap.records import Schema
+from mcap_ros2._dynamic import serialize_dynamic
+from rosbags.typesys import Stores, get_typestore
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.messages import Channel, Unreadable, decoder, read_wrench
+
+NAME = "geometry_msgs/msg/WrenchStamped"
+MSG = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(NAME, ros_version=2)[0]
+ROS1 = get_typestore(Stores.ROS1_NOETIC).generate_msgdef(NAME)[0]
+LINE = "=" * 80
+IDL = f"""{LINE}
+IDL: builtin_interfaces/msg/Time
+module builtin_interfaces {{ module msg {{
+  struct Time {{ int32 sec; uint32 nanosec; }};
+}}; }};
+{LINE}
+IDL: std_msgs/msg/Header
+module std_msgs {{ module msg {{
+  struct Header {{ builtin_interfaces::msg::Time stamp; string frame_id; }};
+}}; }};
+{LINE}
+IDL: geometry_msgs/msg/Vector3
+module geometry_msgs {{ module msg {{ struct Vector3 {{ double x; double y; double z; }}; }}; }};
+{LINE}
+IDL: geometry_msgs/msg/Wrench
+module geometry_msgs {{ module msg {{
+  struct Wrench {{ geometry_msgs::msg::Vector3 force; geometry_msgs::msg::Vector3 torque; }};
+}}; }};
+{LINE}
+IDL: {NAME}
+// generated from rosidl_adapter/resource/msg.idl.em
+#include "geometry_msgs/msg/Wrench.idl"
+#include "std_msgs/msg/Header.idl"
+
+module geometry_msgs {{ module msg {{
+  @verbatim (language="comment", text="A wrench with reference coordinate frame and timestamp")
+  struct WrenchStamped {{ std_msgs::msg::Header header; geometry_msgs::msg::Wrench wrench; }};
+}}; }};
+"""
+
+
+def channel(name: str, encoding: str, data: bytes, messages: str) -> Channel:
+    return Channel("/ft", Schema(1, data, encoding, name), messages)
+
+
+def reading(source: Channel, payload: bytes):
+    return read_wrench(decoder(source)(payload))
+
+
+def cdr() -> bytes:
+    vector = SimpleNamespace(x=1.5, y=-2.0, z=3.25)
+    header = SimpleNamespace(stamp=SimpleNamespace(sec=12, nanosec=34), frame_id="sensor")
+    message = SimpleNamespace(header=header, wrench=SimpleNamespace(force=vector, torque=vector))
+    return serialize_dynamic(NAME, MSG)[NAME](message)
+
+
+@pytest.mark.parametrize(
+    ("name", "encoding", "text"),
+    [
+        (NAME, "ros2msg", MSG),
+        ("geometry_msgs/WrenchStamped", "ros2msg", MSG),
+        (NAME, "ros2idl", IDL),
+        ("geometry_msgs::msg::WrenchStamped", "ros2idl", IDL),
+    ],
+)
+def test_ros_2(name, encoding, text) -> None:
+    sample = reading(channel(name, encoding, text.encode(), "cdr"), cdr())
+    assert sample == (12_000_000_034, "sensor", (1.5, -2.0, 3.25))
+
+
+def test_ros_1() -> None:
+    """wiki.ros.org/roscpp/Overview/MessagesSerializationAndAdaptingTypes: little endian, packed."""
+    frame = b"/sensor"  # ROS 1 has a slash before it
+    payload = struct.pack("<IIII", 7, 12, 34, len(frame)) + frame
+    payload += struct.pack("<6d", 1.5, -2.0, 3.25, 0, 0, 0)
+    source = channel("geometry_msgs/WrenchStamped", "ros1msg", ROS1.encode(), "ros1")
+    assert reading(source, payload) == (12_000_000_034, "sensor", (1.5, -2.0, 3.25))
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        {"header": {"stamp": {"sec": 12, "nanosec": 34}, "frame_id": "sensor"}},
+        {"header": {"stamp": {"secs": 12, "nsecs": 34}, "frame_id": "/sensor", "seq": 3}},
+        {"timestamp": {"sec": 12, "nsec": 34}, "frame_id": "sensor"},
+        {"timestamp": {"seconds": "12", "nanos": 34}, "frame_id": "sensor"},
+        {"timestamp": "1970-01-01T00:00:12.000000034Z", "frame_id": "sensor"},
+    ],
+)
+def test_json_of_ros_and_of_foxglove(head) -> None:
+    force = {"x": 1.5, "y": -2, "z": 3.25}
+    payload = json.dumps({**head, "wrench": {"force": force, "torque": force}}).encode()
+    source = channel("lab.WrenchStamped", "jsonschema", b"{}", "json")
+    assert reading(source, payload) == (12_000_000_034, "sensor", (1.5, -2.0, 3.25))
+
+
+def test_protobuf_of_foxglove() -> None:
+    """Dependencies between the files of the schema, in whatever order they are."""
+    schema = fox.PoseInFrame.get_schema()
+    files = FileDescriptorSet.FromString(schema.data)
+    files.file.extend([files.file.pop(0)])
+    source = channel("foxglove.PoseInFrame", "protobuf", files.SerializeToString(), "protobuf")
+    pose = fox.Pose(position=fox.Vector3(x=1.5, y=-2.0, z=3.25))
+    payload = fox.PoseInFrame(timestamp=fox.Timestamp(12, 34), frame_id="base", pose=pose).encode()
+    message = decoder(source)(payload)
+    assert (message.frame_id, message.timestamp.seconds, message.timestamp.nanos) == (
+        "base",
+        12,
+        34,
+    )
+    assert (message.pose.position.x, message.pose.position.y, message.pose.position.z) == (
+        1.5,
+        -2,
+        3.25,
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "encoding", "data", "messages", "words"),
+    [
+        ("lab/X", "omgidl", b"", "cdr", "schema 'omgidl' with messages 'cdr' cannot"),
+        (NAME, "ros2msg", MSG.encode(), "json", "cannot be read"),
+        ("lab.Wrench", "flatbuffer", b"", "flatbuffer", "ros2msg with cdr.*jsonschema with json"),
+        ("", "", b"", "json", "no schema with messages 'json'"),
+        (NAME, "ros2msg", b"\xff\xfe", "cdr", "bad schema"),
+        (NAME, "ros2msg", b"gibberish of a schema", "cdr", "bad schema"),
+        (NAME, "ros2msg", b"std_msgs/Header header", "cdr", "bad schema"),
+        (NAME, "ros2idl", b"module {", "cdr", "bad schema"),
+        ("lab.Wrench", "protobuf", b"\xff\xff", "protobuf", "bad schema"),
+        ("lab.Wrench", "protobuf", b"", "protobuf", "bad schema"),
+    ],
+)
+def test_what_cannot_be_read_is_one_line_with_the_topic(
+    name, encoding, data, messages, words
+) -> None:
+    with pytest.raises(UserError, match=words) as caught:
+        decoder(channel(name, encoding, data, messages))
+    assert "topic /ft" in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name, encoding, data",
+    [
+        (NAME, "", b""),
+        (NAME, "ros2msg", b""),
+        (NAME, "ros2msg", NAME.encode()),
+        ("geometry_msgs::msg::dds_::WrenchStamped_", "omgidl", b"module geometry_msgs { };"),
+    ],
+)
+def test_a_standard_type_needs_no_schema(name, encoding, data) -> None:
+    sample = reading(channel(name, encoding, data, "cdr"), cdr())
+    assert sample.value == (1.5, -2.0, 3.25) and sample.frame == "sensor"
+
+
+def test_types_of_others_do() -> None:
+    for name, encoding, data in (
+        ("lab_msgs/msg/WrenchStamped", "", b""),
+        ("lab_msgs/msg/WrenchStamped", "omgidl", b""),
+        (NAME, "ros2msg", b"std_msgs/Header header\nfloat32 all_else\n"),  # of another version
+    ):
+        with pytest.raises(UserError):
+            decoder(channel(name, encoding, data, "cdr"))
+
+
+def test_messages_that_are_packed_one_by_one() -> None:
+    source = channel(NAME, "ros2msg", MSG.encode(), "cdr")
+    assert reading(source, zstandard.compress(cdr())).value == (1.5, -2.0, 3.25)
+    with pytest.raises(Unreadable):
+        decoder(source)(zstandard.compress(cdr())[:-20])
+    with pytest.raises(Unreadable, match="too long"):
+        decoder(source)(zstandard.compress(bytes(2**28)))
+    with pytest.raises(Unreadable, match="in XCDR2"):
+        decoder(source)(b"\0\7\0\0" + cdr()[4:])

@@ -1,0 +1,193 @@
+"""Masks of another tool: a folder gives the clouds that they show, or one line says why not."""
+
+from __future__ import annotations
+
+import shutil
+from copy import copy
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.build import (
+    Processed,
+    build_episodes,
+    episode_of,
+    process,
+)
+from sling2sim2real.recording.clouds import masker
+from sling2sim2real.recording.scene import View
+from sling2sim2real.recording.streams import read_recording
+from tests.project import with_
+from tests.recording.conftest import part_of, processed_of, whole_of
+from tests.recording.parts import joined
+from validation.recordings import looks
+from validation.recordings.looks import LOOKS
+
+
+@pytest.fixture(scope="module")
+def by_folder(params):
+    return with_(params, "cloud", mask="folder")
+
+
+@pytest.fixture(scope="module")
+def folded(masked, by_folder) -> Processed:
+    """`seen` by its masks; to be read only."""
+    return processed_of(masked, by_folder)
+
+
+def view_beside(folded: Processed, mine: Path) -> View:
+    """Its view, whose masks are beside another recording."""
+    view = copy(folded.view)
+    view.recording = replace(view.recording, path=mine)
+    return view
+
+
+@pytest.fixture
+def mine(masked, tmp_path) -> Path:
+    """A recording with masks, to be spoiled."""
+    shutil.copytree(masked.parent, tmp_path / "mine")
+    return tmp_path / "mine" / "masked.mcap"
+
+
+def files(recording: Path) -> list[Path]:
+    return sorted(recording.with_suffix(".masks").iterdir())
+
+
+def test_the_same_masks_give_the_same_episode_to_the_byte(episode, folded, by_folder) -> None:
+    ours, theirs = episode, episode_of(folded, "band1")
+    for name in ("time", "position", "velocity", "force", "opening", "cloud_time", "camera"):
+        assert getattr(ours, name).tobytes() == getattr(theirs, name).tobytes()
+    assert [cloud.tobytes() for cloud in ours.clouds] == [
+        cloud.tobytes() for cloud in theirs.clouds
+    ]
+    assert sum(map(len, ours.clouds)) > 1000
+
+
+def test_each_mask_counts_for_its_own_picture_and_no_other(mine, checked, by_folder) -> None:
+    """Bands of one bit a pixel, as some tools write them; one is all black."""
+    black = files(mine)[20]
+    whole = np.asarray(Image.open(black)) > 0
+    assert whole.any()
+    Image.fromarray(np.zeros_like(whole)).save(black)
+    Image.fromarray(np.asarray(Image.open(files(mine)[21])) > 0).save(files(mine)[21])
+    theirs = whole_of(mine, by_folder)
+    expected = checked.clouds.pixels.copy()
+    expected[20] = 0
+    assert theirs.clouds.pixels.tolist() == expected.tolist()
+
+
+def test_a_late_camera_does_not_change_the_names(masked, params, by_folder) -> None:
+    recording = read_recording(masked, params.setup).shifted(camera=-0.015)
+    done = process(part_of(recording, params), params.bands["band1"], by_folder)
+    assert done.delays.camera.applied
+    assert done.whole.clouds.pixels.min() > 0
+
+
+def test_what_a_mask_marks_where_the_band_cannot_be_is_not_the_band(mine, folded) -> None:
+    for file in files(mine):
+        Image.fromarray(np.full((240, 320), 7, np.uint8)).save(file)
+    view = view_beside(folded, mine)
+    mask = masker("folder", view)
+    for _, frame in view.frames():
+        np.testing.assert_array_equal(mask.mask(frame), frame.near)
+
+
+@pytest.mark.slow
+def test_masks_are_warped_to_a_depth_camera_of_its_own(tmp_path) -> None:
+    """A tool that sees by colour marks the colour pictures: depth pixels of the band are found."""
+    view, truths = looks.view_of(LOOKS["orange, colour camera apart"], looks.times(4))
+    view.recording = replace(view.recording, path=tmp_path / "look.mcap")
+    (tmp_path / "look.masks").mkdir()
+    for number in range(len(view)):
+        color = view.color(number).astype(int)
+        orange = (color[..., 2] - color[..., 0] > 50).astype(np.uint8)
+        stamp = round(looks.times(4)[number] * 1e9)
+        cv2.imwrite(str(tmp_path / "look.masks" / f"{stamp}.png"), orange)
+    mask, hits, wrong = masker("folder", view), [], []
+    for number, frame in view.frames():
+        pixels = mask.mask(frame)
+        band = truths[number].part[view.window] == looks.BAND
+        band &= np.abs(frame.depth - truths[number].depth[view.window]) < 0.005
+        hits.append((pixels & band).sum() / band.sum())
+        wrong.append((pixels & ~band & (frame.depth > 0)).sum() / pixels.sum())
+    assert np.mean(hits) > 0.8 and np.mean(wrong) < 0.2
+
+
+def _cut(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[:-30])
+
+
+def _instead(file: Path, pixels: np.ndarray, kind: str = "png", mode: str = "L") -> None:
+    Image.fromarray(pixels).convert(mode).save(file, format=kind)
+
+
+GREY = np.zeros((240, 320), np.uint8)
+SPOILED = {
+    "no folder": (
+        lambda mine: shutil.rmtree(mine.with_suffix(".masks")),
+        "there is no such folder",
+    ),
+    "a file": (
+        lambda mine: (shutil.rmtree(files(mine)[0].parent), mine.with_suffix(".masks").touch()),
+        "there is no such folder",
+    ),
+    "two missing": (
+        lambda mine: [file.unlink() for file in files(mine)[3:5]],
+        "masks of 2 of 54 pictures are missing, NAME first; give a black one",
+    ),
+    "a folder for a mask": (
+        lambda mine: (file := files(mine)[3], file.unlink(), file.mkdir()),
+        "masks of 1 of 54 pictures are missing, NAME first",
+    ),
+    "too small": (
+        lambda mine: _instead(files(mine)[3], GREY[:-1]),
+        "NAME: is of 320 x 239 pixels, not of 320 x 240",
+    ),
+    "colour": (lambda mine: _instead(files(mine)[3], GREY, mode="RGB"), "NAME: is not a grey PNG"),
+    "palette": (lambda mine: _instead(files(mine)[3], GREY, mode="P"), "NAME: is not a grey PNG"),
+    "16 bits": (
+        lambda mine: Image.fromarray(GREY.astype(np.uint16)).save(files(mine)[3]),
+        "NAME: is not a grey PNG",
+    ),
+    "JPEG": (lambda mine: _instead(files(mine)[3], GREY, "jpeg"), "NAME: is not a grey PNG"),
+    "text": (lambda mine: files(mine)[3].write_text("mask"), "NAME: is not a grey PNG"),
+    "empty": (lambda mine: files(mine)[3].write_bytes(b""), "NAME: is not a grey PNG"),
+    "cut off": (lambda mine: _cut(files(mine)[3]), "NAME: damaged PNG"),
+    "all black": (
+        lambda mine: [_instead(file, GREY) for file in files(mine)],
+        "not found in 54 of 54 frames: check the camera's extrinsics and the masks",
+    ),
+}
+
+
+WHOLE = "no folder", "cut off", "all black"  # as an episode is refused; the others: their masks
+
+
+@pytest.mark.parametrize("how", SPOILED)
+def test_masks_that_cannot_be_used_are_named_in_one_line(how, mine, folded, by_folder) -> None:
+    spoil, words = SPOILED[how]
+    name = files(mine)[3].name
+    spoil(mine)
+    with pytest.raises(UserError, match=words.replace("NAME", name)) as caught:
+        if how in WHOLE:
+            build_episodes(mine, "band1", by_folder)
+        view = view_beside(folded, mine)
+        mask = masker("folder", view)
+        for _, frame in view.frames():
+            mask.mask(frame)
+    place = f"{mine}: " if how in WHOLE else str(mine.with_suffix(".masks"))
+    assert str(caught.value).startswith(place) and "\n" not in str(caught.value)
+
+
+def test_masks_of_the_first_pull_alone_leave_the_second_out(masked, tmp_path, by_folder) -> None:
+    path = tmp_path / "masked.mcap"
+    joined(path, [masked, masked])
+    shutil.copytree(masked.with_suffix(".masks"), tmp_path / "masked.masks")
+    episodes, refused = build_episodes(path, "band1", by_folder)
+    assert len(episodes) == 1 and len(refused) == 1
+    assert "pull 2 of 2: " in str(refused[0]) and "masks of 54 of 54" in str(refused[0])

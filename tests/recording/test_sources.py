@@ -1,0 +1,181 @@
+"""The hand's pose, and the force, from whatever a lab records of them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from mcap.records import Schema
+from mcap_ros2._dynamic import serialize_dynamic
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording import kinematics
+from sling2sim2real.recording.messages import Channel, Unreadable
+from tests.recording.messages import (
+    COUNT,
+    FORCE,
+    PLACES,
+    POSES,
+    TIMES,
+    TURNS,
+    assert_poses,
+    channel,
+    chosen,
+    head,
+    joints,
+    played,
+    pose,
+    pose_fields,
+    wrench,
+)
+from validation.recordings.small import STATE, STATE_FIELDS
+
+
+def test_a_pose_with_covariance(params) -> None:
+    messages = [
+        {**head(k), "pose": {"pose": pose_fields(POSES[k]), "covariance": []}} for k in range(COUNT)
+    ]
+    kind = "geometry_msgs/msg/PoseWithCovarianceStamped"
+    choice = chosen(params, wrench("/ft"), channel("/ee", kind, messages))["pose"]
+    frame, values = played(choice)
+    assert (
+        frame == "base" and choice.why == "the only PoseWithCovarianceStamped for end-effector pose"
+    )
+    assert_poses(values)
+
+
+def robot_state(topic: str = "/franka_robot_state_broadcaster/robot_state") -> Channel:
+    """FrankaRobotState in CDR by mcap-ros2-support; some of its fields."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    store.register(get_types_from_msg(STATE_FIELDS, STATE))
+    text = store.generate_msgdef(STATE, ros_version=2)[0]
+    encode = serialize_dynamic(STATE, text)[STATE]
+    payloads = []
+    for k in range(COUNT):
+        message = {
+            **head(k, "link0"),
+            "measured_joint_state": {**head(k), "name": [], "position": []},
+            "o_f_ext_hat_k": {**head(k, "link0"), "wrench": {"force": FORCE, "torque": FORCE}},
+            "o_t_ee": {**head(0, "link0"), "pose": pose_fields(POSES[k])},
+            "robot_mode": 2,
+        }
+        message["measured_joint_state"].update(velocity=[], effort=[])
+        payloads.append(encode(_named(message)))
+    times = [5_000_000_000 + round(1e9 * t) for t in TIMES]
+    return Channel(topic, Schema(1, text.encode(), "ros2msg", STATE), "cdr", times, payloads)
+
+
+def _named(value: object) -> object:
+    if not isinstance(value, dict):
+        return value
+    return SimpleNamespace(**{name: _named(part) for name, part in value.items()})
+
+
+def test_a_franka_robot_state_is_pose_and_for_lack_of_a_sensor_force(params) -> None:
+    roles = chosen(params, robot_state())
+    frame, values = played(roles["pose"])
+    assert frame == "link0"
+    assert_poses(values)
+    frame, values = played(roles["wrench"])
+    assert frame == "link0"
+    np.testing.assert_array_equal(values, [[1, 2, 3]] * COUNT)
+    assert roles["wrench"].why == "the only FrankaRobotState for force"
+
+    with_sensor = chosen(params, robot_state(), wrench("/external_wrench"))
+    assert with_sensor["wrench"].channel.topic == "/external_wrench"
+    name = "/franka_robot_state_broadcaster/robot_state"
+    named = chosen(params, robot_state(), wrench("/ft"), topics={"wrench": name})
+    assert named["wrench"].channel.topic == name
+    assert named["wrench"].why == "setup.topics.wrench"
+
+
+def test_a_franka_state_has_column_major_matrices_and_may_lack_a_frame(params) -> None:
+    """Pose and force are then both in the base, as franka_ros publishes them."""
+    for names, frame, base in (
+        (("O_T_EE", "O_F_ext_hat_K"), "", "franka_base"),
+        (("o_t_ee", "o_f_ext_hat_k"), "link0", "link0"),
+    ):
+        messages = []
+        for k in range(COUNT):
+            matrix = np.eye(4)
+            matrix[:3, :3], matrix[:3, 3] = TURNS[k].as_matrix(), PLACES[k]
+            state = dict(zip(names, (list(matrix.T.ravel()), [1, 2, 3] * 2), strict=True))
+            messages.append({**head(k, frame), **state})
+        roles = chosen(params, channel("/state", "franka_msgs/FrankaState", messages))
+        (of_pose, poses), (of_force, forces) = (played(roles[r]) for r in ("pose", "wrench"))
+        assert of_pose == of_force == base
+        assert_poses(poses)
+        np.testing.assert_array_equal(forces, [[1, 2, 3]] * COUNT)
+
+
+GANTRY = [("x", "prismatic", "1 0 0"), ("y", "prismatic", "0 1 0"), ("z", "prismatic", "0 0 1")]
+GANTRY += [(f"r{name}", "revolute", axis) for name, _, axis in reversed(GANTRY)]
+
+
+GANTRY_URDF = {"urdf": "gantry.urdf"}
+
+
+@pytest.fixture
+def gantry(tmp_path, monkeypatch):
+    """Three slides, then turns about z, y and x: its positions are the pose."""
+    links = ["bench", "a", "b", "c", "d", "e", "my_tcp"]
+    joints = "".join(
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<axis xyz="{axis}"/></joint>'
+        for (name, kind, axis), parent, child in zip(GANTRY, links[:-1], links[1:], strict=True)
+    )
+    (tmp_path / "gantry.urdf").write_text(f'<robot name="gantry">{joints}</robot>')
+    monkeypatch.setattr(kinematics, "FOLDER", tmp_path)
+    return np.hstack([PLACES, TURNS.as_euler("ZYX")])
+
+
+def test_joint_states_through_a_urdf(params, gantry) -> None:
+    """In another order, among others, and beside the gripper's."""
+    names = ["finger_joint1", *(name for name, *_ in reversed(GANTRY))]
+    positions = np.hstack([np.full((COUNT, 1), 0.02), gantry[:, ::-1]])
+    arm = joints("/joint_states", names, positions)
+    gripper = joints("/gripper/joint_states", ["finger_joint1"], gantry[:, :1])
+    roles = chosen(params, wrench("/ft"), gripper, arm, urdf="gantry.urdf")
+    frame, values = played(roles["pose"])
+    assert frame == "bench" and roles["pose"].channel.topic == "/joint_states"
+    assert_poses(values)
+    assert roles["gripper"].channel.topic == "/gripper/joint_states"
+
+    alone = chosen(params, wrench("/ft"), arm, urdf="gantry.urdf")
+    np.testing.assert_array_equal(played(alone["gripper"])[1], [[0.02]] * COUNT)
+    measured = chosen(params, wrench("/ft"), arm, pose(), urdf="gantry.urdf")
+    assert measured["pose"].channel.topic == "/arm/current_pose"
+
+
+def test_arm_and_gripper_that_share_a_topic(params, gantry) -> None:
+    """Each is read from its own messages; the other's raise, for the caller to leave out."""
+    arm = joints("/joint_states", [name for name, *_ in GANTRY], gantry)
+    fingers = joints("/joint_states", ["left_finger", "right_finger"], gantry[:, :2])
+    both = [
+        message for pair in zip(fingers.payloads, arm.payloads, strict=True) for message in pair
+    ]
+    shared = Channel("/joint_states", arm.schema, "json", sorted(arm.log_times * 2), both)
+    roles = chosen(params, wrench("/ft"), shared, urdf="gantry.urdf")
+    assert len(roles["pose"].read(both[1]).value) == 6
+    assert roles["gripper"].read(both[0]).value == tuple(gantry[0, :2])
+    for role, payload in (("pose", both[0]), ("gripper", both[1])):
+        with pytest.raises(Unreadable, match="is missing"):
+            roles[role].read(payload)
+
+
+@pytest.mark.parametrize(
+    ("channel", "setup", "words"),
+    [
+        (joints("/js", ["j1", "j2"], PLACES[:, :2]), {}, "joints j1, j2: put the robot's URDF"),
+        (joints("/js", ["x", "y"], PLACES[:, :2]), GANTRY_URDF, "/js lacks joint z, rz, ry, rx of"),
+        (joints("/js", ["finger"], PLACES[:, :1]), {}, "the file has .*/js .JointState"),
+        (joints("/js", ["x"], PLACES[:, :1]), {"urdf": "no.urdf"}, "no.urdf: cannot be read"),
+    ],
+)
+def test_a_missing_pose_says_what_would_do(params, gantry, channel, setup, words) -> None:
+    with pytest.raises(UserError, match=words) as caught:
+        chosen(params, wrench("/ft"), channel, **setup)
+    text = str(caught.value)
+    assert text.startswith("no end-effector pose") and "\n" not in text

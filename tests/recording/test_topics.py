@@ -1,0 +1,237 @@
+"""Choosing among topics, and saying what lacks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mcap.records import Schema
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.messages import Channel
+from sling2sim2real.recording.topics import camera_of
+from tests.recording.messages import (
+    CAMERA,
+    PLACES,
+    TIMES,
+    chosen,
+    info,
+    joints,
+    picture,
+    played,
+    pose,
+    wrench,
+)
+
+
+def test_the_measured_one_of_several(params) -> None:
+    roles = chosen(
+        params,
+        wrench("/command/wrench"),
+        wrench("/arm/external_wrench"),
+        wrench("/ft_sensor/wrench"),
+        wrench("/battery/ft_force", rate=1.0, count=190),
+        pose("/arm/target_pose"),
+        pose("/camera/ee_pose"),
+        pose("/arm/ee_pose"),
+        pose("/object"),
+    )
+    assert roles["wrench"].channel.topic == "/ft_sensor/wrench"
+    assert roles["wrench"].why == (
+        "of 4 topics: named ft wrench, 1000 Hz; not /arm/external_wrench, /battery/ft_force"
+    )
+    assert roles["pose"].channel.topic == "/arm/ee_pose"
+    assert roles["color"].why == "the only Image for colour images"
+    assert list(roles) == ["wrench", "pose", "color", "depth", "color_info", "depth_info"]
+
+
+def test_where_several_topics_would_do_one_line_lists_them(params) -> None:
+    """Also of two arms: who pulled the band is not guessed; what is named is taken."""
+    arms = [
+        make(f"/{side}/{make.__name__}") for side in ("left", "right") for make in (wrench, pose)
+    ]
+    words = (
+        "several topics would do: setup.topics.wrench /left/wrench, /right/wrench;"
+        " setup.topics.pose /left/pose, /right/pose: name those that are meant in params.yaml"
+    )
+    with pytest.raises(UserError) as caught:
+        chosen(params, *arms)
+    assert str(caught.value) == words
+    topics = {"wrench": "/right/wrench", "pose": "/right/pose"}
+    roles = chosen(params, *arms, topics=topics)
+    assert {role: roles[role].channel.topic for role in topics} == topics
+    webcam = picture("/webcam/rgb", "rgb8", "webcam"), info("/webcam/camera_info", "webcam")
+    one_arm = wrench("/ft"), pose()
+    with pytest.raises(UserError, match="setup.topics.color /cam/color/image, /webcam/rgb: name"):
+        chosen(params, *one_arm, *webcam)
+    packed = replace(CAMERA[0], topic="/cam/color/image/compressed")  # one picture, sent twice
+    assert "color" in chosen(params, *one_arm, packed)
+
+
+def test_fingers_of_any_sign_and_of_two_hands(params) -> None:
+    closing = 0.04 - 0.03 * (TIMES > 1.0)
+    other = 0.04 - 0.035 * (TIMES > 0.5)
+    for positions, wanted in (
+        ({"left_finger": closing, "right_finger": closing}, 2 * closing),
+        ({"left_finger": closing, "right_finger": -closing}, 2 * closing),
+        ({"a_finger": closing, "b_finger": 0 * TIMES}, closing),
+        ({"joint1": other, "finger_joint": closing}, closing),
+        ({"finger": 0 * TIMES}, 0 * TIMES),
+    ):
+        fingers = joints("/joints", list(positions), np.stack([*positions.values()], axis=1))
+        roles = chosen(params, wrench("/ft"), pose(), fingers)
+        np.testing.assert_allclose(played(roles["gripper"])[1][:, 0], wanted)
+    hands = joints("/joints", ["a_finger", "b_finger"], np.stack([closing, other], axis=1))
+    choice = chosen(params, wrench("/ft"), pose(), hands)["gripper"]
+    with pytest.raises(UserError, match="/joints: the joints a_finger, b_finger do not move as"):
+        played(choice)
+
+
+def test_sixteen_grey_bits_are_depth_where_the_name_says_so(params) -> None:
+    camera = [*CAMERA[:2], picture("/cam/depth/image", "mono16", "depth"), CAMERA[3]]
+    assert chosen(params, wrench("/ft"), pose(), camera=camera)["depth"]
+    camera[2] = picture("/cam/infra", "mono16", "depth")
+    with pytest.raises(UserError, match="no depth images"):
+        chosen(params, wrench("/ft"), pose(), camera=camera)
+
+
+def test_the_topics_of_a_realsense(params) -> None:
+    """Registered depth before the camera's own, colour before infrared."""
+    frames = {"color": "color", "aligned_depth_to_color": "color", "depth": "d", "infra1": "d"}
+    encodings = {"color": "rgb8", "infra1": "mono16"}
+    camera = [
+        channel
+        for name, frame in frames.items()
+        for channel in (
+            picture(f"/cam/{name}/image_raw", encodings.get(name, "16UC1"), frame),
+            info(f"/cam/{name}/camera_info", frame),
+        )
+    ]
+    roles = chosen(params, wrench("/ft300/wrench"), pose(), camera=camera)
+    assert {role: choice.channel.topic for role, choice in roles.items()} == {
+        "wrench": "/ft300/wrench",
+        "pose": "/arm/current_pose",
+        "color": "/cam/color/image_raw",
+        "depth": "/cam/aligned_depth_to_color/image_raw",
+        "color_info": "/cam/color/camera_info",
+        "depth_info": "/cam/aligned_depth_to_color/camera_info",
+    }
+
+
+# Camera infos
+
+
+def cameras(params, *channels: Channel, **topics: str):
+    roles = chosen(params, wrench("/ft"), pose(), camera=channels, topics=topics)
+    focals = [camera_of(roles, role).matrix[0, 0] for role in ("color", "depth")]
+    return roles, focals
+
+
+def test_each_camera_has_its_own_info(params) -> None:
+    color, color_info, depth, depth_info = CAMERA
+    assert cameras(params, *CAMERA)[1] == [50, 40]
+    assert cameras(params, *reversed(CAMERA))[1] == [50, 40]
+    away = info("/calibration/depth", "depth", 30.0)  # elsewhere, but of that frame and size
+    roles, focals = cameras(params, color, color_info, depth, away)
+    assert focals == [50, 30]
+    assert roles["depth_info"].why == "of the frame and size of /cam/depth/image"
+    assert roles["color_info"].why == "beside /cam/color/image"
+    flat = [picture("/cam/color", "rgb8", "color"), picture("/cam/depth", "16UC1", "depth")]
+    flat += [info("/cam/color_info", "color"), info("/cam/depth_info", "depth", 40.0)]
+    assert cameras(params, *flat)[1] == [50, 40]
+
+
+def test_a_damaged_first_message_does_not_decide(params) -> None:
+    color, color_info, depth, depth_info = CAMERA
+    bad_info, bad_depth = (
+        replace(channel, payloads=list(channel.payloads)) for channel in (depth_info, depth)
+    )
+    bad_info.payloads = [depth_info.payloads[0].replace(b"40.0", b"-4.0"), *depth_info.payloads * 2]
+    bad_depth.payloads[0] = depth.payloads[0].replace(b"16UC1", b"16QC1")
+    bad_info.log_times = [0] * len(bad_info.payloads)
+    assert cameras(params, color, color_info, bad_depth, bad_info)[1] == [50, 40]
+
+
+def test_registered_depth_may_use_the_colour_cameras(params) -> None:
+    color, color_info, *_ = CAMERA
+    depth = picture("/cam/aligned/image", "16UC1", "color")
+    roles, focals = cameras(params, color, color_info, depth)
+    assert focals == [50, 50]
+    assert roles["depth_info"].why == "of the frame and size of /cam/aligned/image"
+
+
+@pytest.mark.parametrize(
+    ("depth", "words"),
+    [
+        (picture("/cam/depth/image", "16UC1", "depth"), "info"),
+        (picture("/cam/depth/image", "16UC1", "color", 8, 4), "8 x 4"),
+    ],
+)
+def test_unregistered_depth_must_not_use_the_colour_cameras(params, depth, words) -> None:
+    color, color_info, *_ = CAMERA
+    with pytest.raises(UserError, match=f"no camera info of the depth.*{words}"):
+        cameras(params, color, color_info, depth)
+    one_folder = [picture("/cam/color", "rgb8", "color"), picture("/cam/depth", "16UC1", "depth")]
+    with pytest.raises(UserError, match="no camera info of the depth"):
+        cameras(params, *one_folder, info("/cam/camera_info", "color"))
+    for nameless in (
+        [color, info("/cam/color/camera_info", ""), depth],
+        [color, color_info, picture("/cam/depth/image", "16UC1", "")],
+    ):
+        with pytest.raises(UserError, match="no camera info of the depth"):
+            cameras(params, *nameless)
+    roles, _ = cameras(params, *CAMERA[:3], depth_info="/cam/color/camera_info")
+    assert roles["depth_info"].why == "setup.topics.depth_info"  # who says so is believed
+
+
+# What lacks
+
+
+def test_a_missing_force_says_what_there_is(params) -> None:
+    with pytest.raises(UserError, match="no force.*the file has /arm/current_pose .PoseStamped"):
+        chosen(params, pose())
+
+
+def test_pictures_that_cannot_be_decoded_are_refused_beforehand(params) -> None:
+    bayer = picture("/cam/color/bayer", "bayer_rggb8", "color")
+    with pytest.raises(UserError, match="no colour images.*/cam/color/bayer.*'bayer_rggb8'"):
+        chosen(params, wrench("/ft"), pose(), camera=[bayer, *CAMERA[1:]])
+    assert chosen(params, wrench("/ft"), pose(), camera=[bayer, *CAMERA])
+    with pytest.raises(UserError, match="setup.topics.color: /cam/color/bayer: .*'bayer_rggb8'"):
+        topics = {"color": "/cam/color/bayer"}
+        chosen(params, wrench("/ft"), pose(), camera=[bayer, *CAMERA], topics=topics)
+
+
+@pytest.mark.parametrize(
+    ("topics", "words"),
+    [
+        ({"wrench": "/none"}, "setup.topics.wrench: no topic /none, the file has /arm/current"),
+        ({"pose": "/ft"}, "setup.topics.pose: /ft is a geometry_msgs/WrenchStamped, not PoseSt"),
+        ({"pose": "/js"}, "setup.topics.pose: /js has the joints j1, j2, j3: put the robot's URDF"),
+        ({"depth": "/cam/color/image"}, "setup.topics.depth: /cam/color/image: .*'rgb8'"),
+        ({"color_info": "/ft"}, "not CameraInfo or CameraCalibration"),
+    ],
+)
+def test_named_topics_that_will_not_do(params, topics, words) -> None:
+    arm = joints("/js", ["j1", "j2", "j3"], PLACES)
+    with pytest.raises(UserError, match=words) as caught:
+        chosen(params, wrench("/ft"), pose(), arm, topics=topics)
+    assert "\n" not in str(caught.value)
+
+
+def test_json_without_a_schema_is_called_so(params) -> None:
+    bare = Channel("/ft", Schema(0, b"", "", ""), "json", [1], [b"{}"])
+    with pytest.raises(UserError, match="the file has .*/ft .json topic without a schema"):
+        chosen(params, bare, pose())
+    with pytest.raises(UserError, match="/ft is a json topic without a schema, not WrenchSt"):
+        chosen(params, bare, pose(), topics={"wrench": "/ft"})
+
+
+def test_a_topic_in_an_unknown_encoding_is_named_if_nothing_else_will_do(params) -> None:
+    other = Channel(
+        "/ft", Schema(1, b"", "flatbuffer", "lab.WrenchStamped"), "flatbuffer", [1], [b""]
+    )
+    with pytest.raises(UserError, match="no force.*topic /ft: schema 'flatbuffer'"):
+        chosen(params, other, pose())
+    assert chosen(params, other, wrench("/ft2"), pose())["wrench"].channel.topic == "/ft2"

@@ -67,7 +67,7 @@ class Theta:
     """The parameters θ of a band; the five are the paper's.
 
     With some of those that are of rubber the material is of that law, without them it is
-    neo-Hookean. A value that no material has is a UserError.
+    neo-Hookean unless `law` says "corotated". A value that no material has is a UserError.
 
     >>> from sling2sim2real import Theta
     >>> five = Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6)
@@ -94,6 +94,7 @@ class Theta:
         air_drag: Beyond a cylinder's: force for mass and speed [1/s].
         turn_damping: Share of the damping that brakes turns without stretch.
         returned_share: Energy that a launch gets over what the law gives it.
+        law: Of the material: neo_hookean, rubber or corotated.
     """
 
     youngs_modulus: float
@@ -110,10 +111,14 @@ class Theta:
     air_drag: float = 0.0
     turn_damping: float = 0.0
     returned_share: float = 1.0
+    law: str = ""
 
     def __post_init__(self) -> None:
         for attribute in fields(self):
             object.__setattr__(self, attribute.name, _plain(getattr(self, attribute.name)))
+        if not self.law:
+            of_rubber = any(getattr(self, name) is not None for name in ADDED)
+            object.__setattr__(self, "law", RUBBER if of_rubber else NEO_HOOKEAN)
         if self.flow and self.log_flow_rate is None:
             raise UserError("theta.log_flow_rate: must be given beside flow")
         if self.law == RUBBER:  # what is not given of it is none
@@ -124,11 +129,6 @@ class Theta:
             ThetaFile.model_validate(self.content("band", LaunchHistory(1.0, 0.0)))
         except ValidationError as error:
             raise UserError(explained(error, ThetaFile)) from error
-
-    @property
-    def law(self) -> str:
-        """Law of the material: neo_hookean or rubber."""
-        return RUBBER if any(getattr(self, name) is not None for name in ADDED) else NEO_HOOKEAN
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -146,19 +146,18 @@ class Theta:
         return Parameters.named(self.law, {name: getattr(self, name) for name in self.names})
 
     @classmethod
-    def of(cls, names: Sequence[str], point: np.ndarray) -> Theta:
+    def of(cls, names: Sequence[str], point: np.ndarray, law: str = "") -> Theta:
         """Make θ from a vector (P,) by its names; the inverse of `point`."""
-        return cls(**dict(zip(names, np.asarray(point, float).tolist(), strict=True)))
+        values = dict(zip(names, np.asarray(point, float).tolist(), strict=True))
+        return cls(**values, law=law)
 
     def content(self, band: str, history: LaunchHistory | None = None) -> dict:
         """What a θ file holds (`sling launch --theta`)."""
         named = {name: getattr(self, name) for name in (*THETA, *ADDED)}
-        of_law = {}
-        if self.law == RUBBER:
-            of_law = {"law": RUBBER, "history": history and vars(history)}
         return {
             "band": band,
-            **of_law,
+            **({} if self.law == NEO_HOOKEAN else {"law": self.law}),
+            **({"history": history and vars(history)} if self.law == RUBBER else {}),
             "theta": {name: value for name, value in named.items() if value is not None},
             "nuisances": {"air_drag": self.air_drag},
             "turn_damping": self.turn_damping,
@@ -173,7 +172,8 @@ class Theta:
     @classmethod
     def of_file(cls, file: ThetaFile) -> Theta:
         """Make θ from a θ file's content, checked."""
-        return cls(**parameters_of(file.model_dump(exclude_unset=True)).sample())
+        parameters = parameters_of(file.model_dump(exclude_unset=True))
+        return cls.of(parameters.names, parameters.values[0], parameters.law)
 
 
 @dataclass(frozen=True)

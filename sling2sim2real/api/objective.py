@@ -46,7 +46,7 @@ class Objective:
         model: Model,
         episodes: Sequence[Episode],
         *,
-        method: str = "sling2sim2real",
+        method: str = "paper",
         loss: Callable[[Simulation, Episode], float] | None = None,
     ) -> None:
         """Prepare the loss; several episodes count alike.
@@ -106,7 +106,7 @@ class Objective:
     def theta(self, unit: np.ndarray) -> Theta:
         """θ at a point of the unit cube (D,)."""
         whole = self._box.fill(np.asarray(unit, float)[None])[0]
-        return Theta.of(self._box.names, self._box.to_physical(whole))
+        return Theta.of(self._box.names, self._box.to_physical(whole), self._box.law)
 
     def unit(self, theta: Theta) -> np.ndarray:
         """The point (D,) of θ; fixed parameters are left out."""

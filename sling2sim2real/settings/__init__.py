@@ -22,7 +22,7 @@ from sling2sim2real.settings.identification import (
     SlingParams,
     check_method,
 )
-from sling2sim2real.settings.lab import BandName, BandParams, PlanParams, SetupParams
+from sling2sim2real.settings.lab import BandParams, PlanParams, SetupParams
 from sling2sim2real.settings.launches import LaunchParams, PolicyParams, TrialsParams
 from sling2sim2real.settings.recording import CloudParams, EpisodeParams, ForceParams
 
@@ -72,7 +72,7 @@ class Settings(Section):
     policy: PolicyParams = PolicyParams()
     launch: LaunchParams = LaunchParams()
     trials: TrialsParams = TrialsParams()
-    bands: dict[BandName, BandParams] = {}
+    bands: dict[Name, BandParams] = {}
 
     @classmethod
     def default(cls, **changes: Mapping) -> Self:

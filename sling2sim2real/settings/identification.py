@@ -12,7 +12,7 @@ from sling2sim2real.base.schema import ASCENDING, LIST, Range, Section, Seed, re
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound", bound=float)
 KTop = Annotated[int, Range(1, 50)]
-Law = Literal["neo_hookean", "rubber"]  # of the band's material
+Law = Literal["neo_hookean", "rubber", "corotated"]  # of the band's material
 # What each has beside the five, and how far its box may reach.
 LAWS: dict[str, dict[str, tuple[float, float]]] = {
     "neo_hookean": {},
@@ -24,15 +24,12 @@ LAWS: dict[str, dict[str, tuple[float, float]]] = {
         "flow": (0.0, 1.0),
         "log_flow_rate": (-1.0, 6.0),
     },
+    "corotated": {},
 }
-LEAST_SQUARES = "least_squares"
+POSTERIOR, PAPER = "posterior", "paper"
 UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
-SEARCHES = ("multistart", LEAST_SQUARES, "de", "bo", "adam")
-STEPS = {  # stages of a search before `theta`; a function of the user's has `search`
-    "multistart": ("history", "clusters", "cma"),
-    LEAST_SQUARES: ("history", "density"),
-    **{name: (name,) for name in ("de", "bo", "adam")},
-}
+SEARCHES = ("multistart", POSTERIOR, "de", "bo", "adam")
+OWN = "own"  # any other: a function of the user's
 OUR_ENGINE = "sling"
 ENGINES = OUR_ENGINE, "physx"
 
@@ -197,19 +194,19 @@ class MethodParams(MethodDefaults):
         return self
 
     @model_validator(mode="after")
-    def _least_squares_fixes_the_unseen(self) -> MethodParams:
-        if self.search != LEAST_SQUARES:
+    def _posterior_fixes_the_unseen(self) -> MethodParams:
+        if self.search != POSTERIOR:
             return self
         more = {*self.fixed} - {*UNSEEN}
         if not (more <= {*LAWS[self.law]} and {*UNSEEN} <= {*self.fixed}):
             raise refusal(
-                f"search: {LEAST_SQUARES} wants `fixed` to name {', '.join(UNSEEN)}, which no pull"
+                f"search: {POSTERIOR} wants `fixed` to name {', '.join(UNSEEN)}, which no pull"
                 " shows, and besides them no more than what its law adds"
             )
         if self.settings:
-            raise refusal(f"settings: {LEAST_SQUARES} has none")
+            raise refusal(f"settings: {POSTERIOR} has none")
         if self.engine != OUR_ENGINE:
-            raise refusal(f"search: {LEAST_SQUARES} wants engine: {OUR_ENGINE}")
+            raise refusal(f"search: {POSTERIOR} wants engine: {OUR_ENGINE}")
         return self
 
     @model_validator(mode="after")
@@ -224,9 +221,9 @@ class MethodParams(MethodDefaults):
 
 
 METHODS = {
-    "sling2sim2real": MethodParams(),  # the paper's
-    LEAST_SQUARES: MethodParams(  # ours: the mode of one density over all recordings and launches
-        search=LEAST_SQUARES,
+    PAPER: MethodParams(),  # the paper's
+    POSTERIOR: MethodParams(  # ours: the mode of one density over all recordings and launches
+        search=POSTERIOR,
         law="rubber",
         fixed={"poissons_ratio": 0.47, "dynamic_friction": 0.8, "damping_scale": 0.6},
         bounds={
@@ -244,11 +241,6 @@ METHODS = {
 def parameter_names(law: str) -> tuple[str, ...]:
     """The parameters of a law, in the order of all tables: θ, then what the law adds."""
     return (*ParameterBoxes.model_fields, *LAWS[law])
-
-
-def steps_of(search: str) -> tuple[str, ...]:
-    """The stages of a search, the last of which writes its evaluations."""
-    return STEPS.get(search, ("search",))
 
 
 def check_method(

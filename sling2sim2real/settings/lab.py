@@ -1,4 +1,4 @@
-"""Settings of a lab: bands, set-up and the pull to record."""
+"""What params.yaml says of a lab: bands, set-up and recorded pull."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from sling2sim2real.base.schema import (
     Component,
     Direction,
     Metres,
-    Name,
     Pose,
     Range,
     Section,
@@ -31,15 +30,6 @@ def _lies_beside(name: str) -> str:
 
 
 FileName = Annotated[str, FILLED, AfterValidator(_lies_beside)]
-
-
-def _is_free(name: str) -> str:
-    if name.lower() == "measured":
-        raise refusal("data/trials/measured holds measured landings, choose another name")
-    return name
-
-
-BandName = Annotated[Name, AfterValidator(_is_free)]
 
 
 class BandParams(Section):

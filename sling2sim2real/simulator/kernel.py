@@ -14,7 +14,7 @@ import warp as wp
 from sling2sim2real.base.native import built_once, text_of
 from sling2sim2real.simulator.model import DOFS
 from sling2sim2real.simulator.records import macros
-from sling2sim2real.simulator.rubber import RUBBER, memories
+from sling2sim2real.simulator.rubber import COROTATED, RUBBER, memories
 
 
 @built_once
@@ -55,7 +55,8 @@ def sling_kernel(
         first_free: int
         launching: int
 
-    parts = ("lanes.h", "state.h", "material.h", "rubber.h", "rod.h", "solve.h", "step.h")
+    laws = "material.h", "rubber.h", "corotated.h"
+    parts = ("lanes.h", "state.h", *laws, "rod.h", "solve.h", "step.h")
     text = text_of(
         *(Path(__file__).with_name(part) for part in parts),
         arrays=Arrays,
@@ -65,6 +66,7 @@ def sling_kernel(
         L=sections,
         MID=middle,
         RUBBER=int(law == RUBBER),
+        COROTATED=int(law == COROTATED),
         MEMORIES=memories(law),
         **macros(),
     )

@@ -118,7 +118,7 @@ class ClampedBand:
         clamped: Whether the first and the last end are held; experiments on a free band let go.
         clamp_twist: Of the last clamp about the band, against the first [rad].
         air_density: For the drag of a cylinder across the wind [kg/m^3].
-        law: NEO_HOOKEAN, or RUBBER (rubber.h).
+        law: NEO_HOOKEAN, RUBBER (rubber.h) or COROTATED (corotated.h).
         stretched: Largest stretch that the band has seen before, which softened it; one, or one of
             each in a batch, shape (N,).
     """

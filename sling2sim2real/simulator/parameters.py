@@ -31,7 +31,7 @@ class Parameters:
     `returned_share`: of the energy that the law gives a launch, what it truly gets.
 
     Attributes:
-        law: NEO_HOOKEAN or RUBBER.
+        law: NEO_HOOKEAN, RUBBER or COROTATED.
         values: Physical, shape (N, P).
     """
 

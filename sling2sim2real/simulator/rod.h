@@ -104,9 +104,9 @@ auto stage_section = [&](int i) {
       x[k][c] = now; xp[k][c] = predicted; xt[k][c] = (now - y) * ibh;
     }
     real stress[3][3], K[6][3][3];
-#if RUBBER
+#if RUBBER || COROTATED
     material(x, xp, xt, steeper(xp[0]), stress, K);
-    add_rubber(i, x[0], stress[0], K[0]);
+    add_law(i, x[0], stress[0], K[0]);
 #else
     material(x, xp, xt, one, stress, K);
 #endif

@@ -62,7 +62,7 @@ auto steeper = [&](const real* predicted) -> real {
   return one + mooney * ((SC)3 * i3 * i * per - one) + upturn * (first + (SC)2 * neo * neo * per);
 };
 // to the stress of a stretch g and its derivative
-auto add_rubber = [&](int i, const real (&g)[3], real (&stress)[3], real (&K)[3][3]) {
+auto add_law = [&](int i, const real (&g)[3], real (&stress)[3], real (&K)[3][3]) {
   const real l = SQRT(dot(g, g) + (SC)1e-12);
   real p, slope, extra, extra_slope, work;
   uniaxial(l, p, slope, extra, extra_slope, work);

@@ -21,7 +21,7 @@ import numpy as np
 
 from sling2sim2real.settings.identification import LAWS
 
-NEO_HOOKEAN, RUBBER = LAWS
+NEO_HOOKEAN, RUBBER, COROTATED = LAWS
 TIMES = np.geomspace(0.003, 1e4, 8)  # of the branches [s]
 DECADES = np.log10(TIMES[1] / TIMES[0])  # from one to the next
 LATER = 10.0  # s after a sudden stretch

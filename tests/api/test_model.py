@@ -53,15 +53,20 @@ def test_points_of_their_own(world) -> None:
 
 
 @pytest.mark.parametrize(
-    "rubber", [{}, dict(zip(LAWS["rubber"], (0.2, 0.1, 0.2, 0.01, 0.1, 2.0), strict=True))]
+    "law",
+    [
+        {},
+        {"law": "corotated"},
+        dict(zip(LAWS["rubber"], (0.2, 0.1, 0.2, 0.01, 0.1, 2.0), strict=True)),
+    ],
 )
-def test_theta_is_read_as_it_is_written(tmp_path, rubber) -> None:
-    theta = Theta(2e5, 0.47, 2.4e-3, 0.7, 0.6, **rubber, **EXTRA)
+def test_theta_is_read_as_it_is_written(tmp_path, law) -> None:
+    theta = Theta(2e5, 0.47, 2.4e-3, 0.7, 0.6, **law, **EXTRA)
     path = tmp_path / "theta.json"
     path.write_text(json.dumps(theta.content("band", HISTORY)))
     assert Theta.load(path) == theta
     assert load_theta(path, "band")["band"] == "band"
-    assert Theta.of(theta.names, theta.point) == theta
+    assert Theta.of(theta.names, theta.point, theta.law) == theta
     assert replace(theta, youngs_modulus=np.float32(200000)) == theta
 
 
@@ -71,6 +76,8 @@ def test_theta_is_read_as_it_is_written(tmp_path, rubber) -> None:
         ({"youngs_modulus": -1.0}, "theta.youngs_modulus: must be between"),
         ({"youngs_modulus": "2e5"}, "theta.youngs_modulus: must be a number"),
         ({"mooney_share": 2.0}, "theta.mooney_share: must be between"),
+        ({"law": "corotated", "upturn": 0.1}, "theta: of the law corotated it must have exactly"),
+        ({"law": "hookean"}, "law: must be 'neo_hookean', 'rubber' or 'corotated'"),
         ({"flow": 0.3}, "theta.log_flow_rate: must be given beside flow"),
         ({"returned_share": 0.0}, "returned_share: must be between"),
     ],

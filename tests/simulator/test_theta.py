@@ -114,3 +114,11 @@ def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:
     path.write_text(json.dumps(content | {"names": with_drag["names"]}))
     with pytest.raises(UserError, match="samples: must have a column for each"):
         load_samples(path, best)
+
+
+def test_the_law_corotated_is_named_and_has_the_five_parameters(tmp_path: Path) -> None:
+    written = content_of(Parameters.of("corotated", [*SOFT.values()]))
+    file = tmp_path / "theta.json"
+    file.write_text(json.dumps({"band": "red"} | written))
+    assert written["law"] == "corotated" and "history" not in written
+    assert parameters_of(load_theta(file, "red")).law == "corotated"

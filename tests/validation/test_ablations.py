@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.params import load
 from sling2sim2real.identification.objective.box import latin_hypercube
-from sling2sim2real.identification.searches.differential_evolution import differential_evolution
+from sling2sim2real.identification.searches.de import differential_evolution
 from tests.identification.searches.functions import batches_of
 from validation.campaigns.ablations import FIRST, PAPER, Job, jobs_of, summary
 from validation.campaigns.variants import LAST, rollouts_of_search, with_preset, with_variants
@@ -96,7 +96,7 @@ def test_each_variant_changes_what_its_name_says_and_a_preset_the_budget() -> No
     default = load(DEFAULTS)
     usual, large = (with_variants(with_preset(default, PAPER, name)) for name in (None, "large"))
     plain = usual.methods.keys() - default.methods.keys()
-    assert len(plain) == 5
+    assert len(plain) == 6
     assert all(usual.methods[name] != usual.methods[PAPER] for name in plain)
     assert [rollouts_of_search(params, PAPER) for params in (usual, large)] == [600, 5760]
     assert rollouts_of_search(with_variants(with_preset(default, "bo", "large")), "bo") == 2400

@@ -20,7 +20,7 @@ from sling2sim2real.simulator.initial import fixed_frames
 from sling2sim2real.simulator.material import material
 from sling2sim2real.simulator.model import GRAVITY, ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
-from sling2sim2real.simulator.rubber import JOIN, RUBBER, TIMES, relaxed
+from sling2sim2real.simulator.rubber import COROTATED, JOIN, RUBBER, TIMES, relaxed
 
 TURNS = 1e-2  # of the modulus: keeps the spin of an unstressed edge regular
 HOLDS, TAUT = (
@@ -148,7 +148,21 @@ class ReferenceRod:
             pull = self.softened(stretch) * virgin - self.uniaxial(stretch, shape=(0.0, 0.0))
             pull = pull + self.carried + self.following * virgin
             stress[..., 0, :] += (pull / stretch)[..., None] * f[..., 0, :]
+        if self.sling.law == COROTATED:
+            stretch = self.stretch(f)
+            pull = self.corotated(stretch) - self.uniaxial(stretch, shape=(0.0, 0.0))
+            stress[..., 0, :] += (pull / stretch)[..., None] * f[..., 0, :]
         return self.sling.area * stress
+
+    def corotated(self, stretch: np.ndarray, order: int = 0) -> np.ndarray:
+        """As `uniaxial`, of the law `corotated`: of an edge that keeps its volume."""
+        mu = 2 * self.parameters[0]
+        at = np.where(np.real(stretch) > STRAIGHT, stretch, STRAIGHT)
+        past = stretch - at
+        work = at**2 / 2 - at + 1 / at - 2 / np.sqrt(at) + 1.5
+        stress, slope = at - 1 - at**-2 + at**-1.5, 1 + 2 * at**-3 - 1.5 * at**-2.5
+        both = work + stress * past + slope * past**2 / 2, stress + slope * past, slope
+        return mu * both[order + 1]
 
     # ---- the law `rubber`: an edge's stretch, and the stress along it
 
@@ -238,6 +252,10 @@ class ReferenceRod:
             stretch = np.maximum(self.stretch(f), STRAIGHT)
             s = s * (self.uniaxial(stretch, 1) / self.uniaxial(stretch, 1, shape=(0.0, 0.0)))
             s = s[..., None, None]
+        if self.sling.law == COROTATED:
+            stretch = np.maximum(self.stretch(f), STRAIGHT)
+            s = s * (self.corotated(stretch, 1) / self.uniaxial(stretch, 1, shape=(0.0, 0.0)))
+            s = s[..., None, None]
         p = p[..., None, None]
         stress = mu * f + p * cof
         spin = ((1 - braked)[..., None] * self._spin(f, stress, turn, mu))[..., None, :]
@@ -314,6 +332,9 @@ class ReferenceRod:
         if self.sling.law == RUBBER:
             stretch = self.stretch(f)
             density += self.stored(stretch) - self.uniaxial(stretch, -1, shape=(0.0, 0.0))
+        if self.sling.law == COROTATED:
+            stretch = self.stretch(f)
+            density += self.corotated(stretch, -1) - self.uniaxial(stretch, -1, shape=(0.0, 0.0))
         edges = (density * self.sling.area * self.sling.edge_lengths).sum(-1)
         bend, torsion = self._stiffness
         frames = self._frames(x, 1)

@@ -20,6 +20,7 @@ from validation.reports import row
 from validation.simulator import (
     agreement,
     at_rest,
+    corotated,
     damping,
     energy,
     free_motion,
@@ -55,6 +56,7 @@ SECTIONS: dict[str, Callable[[Bench], Theme]] = {
     "launches": launching.section,
     "random parameters": robustness.section,
     "the law rubber": rubber.section,
+    "the law corotated": corotated.section,
     "against MuJoCo": engines.section,
 }
 

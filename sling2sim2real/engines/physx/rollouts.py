@@ -23,7 +23,7 @@ from sling2sim2real.exporting.usd import EDGES, GRADING, RATE
 from sling2sim2real.simulator.interaction import GRASP_BLEND, Rollouts
 from sling2sim2real.simulator.model import GRAVITY, ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
-from sling2sim2real.simulator.rubber import NEO_HOOKEAN
+from sling2sim2real.simulator.rubber import COROTATED, NEO_HOOKEAN
 
 SETTLE, LEAD = 1.0, 0.3  # s of hanging before the grasp, of them to lead the ends into the clamps
 
@@ -43,8 +43,8 @@ def simulate(
 
     Raises UserError: as `Engine`, or for a law that PhysX does not have.
     """
-    if sling.law != NEO_HOOKEAN:
-        raise UserError(f"engine: physx has no law {sling.law}; set law: {NEO_HOOKEAN}")
+    if sling.law not in (NEO_HOOKEAN, COROTATED):  # five parameters each, which PhysX has too
+        raise UserError(f"engine: physx has no law {sling.law}; set law: {COROTATED}")
     tube, thetas = Tube.of(sling, EDGES, GRADING), parameters.theta
     _, held, free = _engine().simulate(tube, thetas, phases(tube, episode))
     return rollouts(sling, tube, episode, thetas, held, free)

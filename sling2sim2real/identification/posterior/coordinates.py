@@ -119,6 +119,10 @@ class Coordinates:
         """Steps of finite differences, shape (D,)."""
         return np.array([STEPS[name] for name in self.names])
 
+    def differences(self, phi: np.ndarray) -> np.ndarray:
+        """Steps of finite differences from coordinates (D,), away from the upper bounds."""
+        return np.where(phi + self.steps > self.high, -self.steps, self.steps)
+
     def prior(self, level: float) -> np.ndarray:
         """Ends of the central `level` of each coordinate's prior, shape (2, D)."""
         return self.quantiles(np.repeat([[1 - level], [1 + level]], len(self.names), axis=1) / 2)

@@ -1,8 +1,9 @@
-"""A recording's -2 log p around a point, its nuisances eliminated; and what is left of it there."""
+"""Residuals of a recording around a point, whitened, and what its own nuisances leave of them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -12,57 +13,141 @@ UNLIKE = 0.05  # an autocorrelation that is none
 
 
 @dataclass(frozen=True)
-class NuisanceProjection:
-    """Takes what K nuisances explain out of residuals: least squares, by its QR decomposition.
+class Form:
+    """What of a recording's density stays as it is within a pass of the fit.
 
     Attributes:
-        weight: One over the spread of each residual, shape (R,).
-        priors: Residuals of the nuisances' own priors, shape (K,).
-        basis: Orthonormal, of all that they do to both, shape (R + K, K).
+        residuals: In their bins, R of them.
+        weight: One over the spread of each, shape (R,).
+        basis: Orthonormal, of what the M linear nuisances do to the residuals and to their own
+            priors, shape (R + M, M).
     """
 
+    residuals: Residuals
     weight: np.ndarray
-    priors: np.ndarray
     basis: np.ndarray
 
-    def __call__(self, residuals: np.ndarray) -> np.ndarray:
-        """What is left of residuals (N, R), shape (N, R + K): its squares add up to the misfit."""
-        priors = np.broadcast_to(self.priors, (len(residuals), len(self.priors)))
-        gaps = np.concatenate([residuals * self.weight, priors], axis=1)
+    @classmethod
+    def of(cls, residuals: Residuals, weight: np.ndarray, linear: np.ndarray) -> Form:
+        """Make it of the nuisances' columns (M, R), each in units of its tolerance."""
+        effects = np.vstack([(linear * weight).T, np.eye(len(linear))])
+        return cls(residuals, weight, np.linalg.qr(effects)[0])
+
+    def whitened(self, vectors: np.ndarray) -> np.ndarray:
+        """Residuals (N, R) without what linear nuisances explain, shape (N, R + M).
+
+        Their squares add up to the least of |residuals / spread|^2 + |m|^2 over those nuisances m.
+        """
+        priors = np.zeros((len(vectors), self.basis.shape[1]))
+        gaps = np.concatenate([vectors * self.weight, priors], axis=1)
         return gaps - (gaps @ self.basis) @ self.basis.T
 
 
 @dataclass(frozen=True)
 class Expansion:
-    """-2 log p of a recording around (phi, n), its nuisances eliminated.
+    """Whitened residuals of a recording at (phi, n), and how they change; Q rows, n's priors last.
 
     Attributes:
-        misfit: There, with the linear nuisances at their best.
-        hessian, gradient: misfit + const - 2 gradient d + d' hessian d for d in phi, (D, D), (D,).
-        nuisances: Best change of the simulated ones, and its change with d, (3,), (3, D).
-        spread: Standard deviations of the simulated ones, given phi, (3,).
-        residuals, left: What was compared, and what of it is left at d = 0, shape (R,).
-        elimination: Takes the nuisances out of other residuals too.
-        uncounted: What the loss factor does to the force, which does not count, shape (R,): from
-            `origin` on, the logarithm of the loss factor where a pass of the fit began.
+        form: Of the density.
+        left: Shape (Q,); its squares add up to the misfit.
+        slopes, nuisance_slopes: Shapes (Q, D) and (Q, 3).
+        uncounted: What the loss factor does to the force, which does not count, shape (Q,).
+        origin: The logarithm of the loss factor there.
     """
 
-    misfit: float
-    hessian: np.ndarray
-    gradient: np.ndarray
-    nuisances: tuple[np.ndarray, np.ndarray]
-    spread: np.ndarray
-    residuals: Residuals
+    form: Form
     left: np.ndarray
-    elimination: NuisanceProjection
+    slopes: np.ndarray
+    nuisance_slopes: np.ndarray
     uncounted: np.ndarray
     origin: float
 
+    @classmethod
+    def of(
+        cls,
+        form: Form,
+        here: np.ndarray,
+        slopes: np.ndarray,
+        nuisance_slopes: np.ndarray,
+        uncounted: np.ndarray,
+        priors: np.ndarray,
+        prior_slopes: np.ndarray,
+        *,
+        origin: float,
+    ) -> Expansion:
+        """Make it of residuals (R,), their slopes (D, R), (3, R) and (R,), and n's priors (3,)."""
+
+        def rows(vectors: np.ndarray, priors: np.ndarray) -> np.ndarray:
+            return np.hstack([form.whitened(vectors), priors]).T
+
+        count = len(priors)
+        return cls(
+            form,
+            left=rows(here[None], priors[None])[:, 0],
+            slopes=rows(slopes, np.zeros((len(slopes), count))),
+            nuisance_slopes=rows(nuisance_slopes, np.diag(prior_slopes)),
+            uncounted=rows(uncounted[None], np.zeros((1, count)))[:, 0],
+            origin=origin,
+        )
+
+    @property
+    def misfit(self) -> float:
+        """-2 log p, the linear nuisances at their best and the simulated ones as they are."""
+        return float(self.left @ self.left)
+
+    @cached_property
+    def _factors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Orthonormal basis (Q, 3) of what the simulated nuisances do, and the triangle (3, 3)."""
+        basis, triangle = np.linalg.qr(self.nuisance_slopes)
+        return basis, triangle
+
+    def cleared(self, vectors: np.ndarray) -> np.ndarray:
+        """What the simulated nuisances leave of vectors (N, Q): least squares."""
+        basis, _ = self._factors
+        return vectors - (vectors @ basis) @ basis.T
+
+    @cached_property
+    def hessian(self) -> np.ndarray:
+        """The least over n of |left + slopes d + nuisance_slopes n|^2 is
+        const - 2 gradient d + d' hessian d; shape (D, D).
+        """
+        slopes = self.cleared(self.slopes.T)
+        return slopes @ slopes.T
+
+    @cached_property
+    def gradient(self) -> np.ndarray:
+        """As `hessian`, shape (D,)."""
+        return -self.slopes.T @ self.cleared(self.left[None])[0]
+
+    @cached_property
+    def nuisance_change(self) -> np.ndarray:
+        """How the best n changes with phi, shape (3, D)."""
+        basis, triangle = self._factors
+        return -np.linalg.solve(triangle, basis.T @ self.slopes)
+
+    @cached_property
+    def nuisance_spread(self) -> np.ndarray:
+        """Standard deviations of n, given phi, shape (3,)."""
+        _, triangle = self._factors
+        return np.linalg.norm(np.linalg.inv(triangle), axis=1)
+
+    @property
+    def _residuals(self) -> np.ndarray:
+        """What the linear nuisances leave [N, m], shape (R,)."""
+        return self.left[: len(self.form.weight)] / self.form.weight
+
+    @property
+    def _bins(self) -> np.ndarray:
+        """Of it depth and side of the bins [m], shape (2, M)."""
+        residuals = self.form.residuals
+        return self._residuals[3 * len(residuals.samples) :].reshape(2, -1)
+
     def rms(self, part: str) -> float:
         """Root mean square of what is left of force [N], held or recoil [m]; 0 of nothing."""
-        count = len(self.left) - 2 * len(self.residuals.picture)
-        bins, recoils = self.left[count:].reshape(2, -1), self.residuals.recoils
-        parts = {"force": self.left[:count], "held": bins[:, ~recoils], "recoil": bins[:, recoils]}
+        residuals = self.form.residuals
+        recoils = residuals.recoils
+        force = self._residuals[: 3 * len(residuals.samples)]
+        parts = {"force": force, "held": self._bins[:, ~recoils], "recoil": self._bins[:, recoils]}
         return float(np.sqrt(np.mean(parts[part] ** 2))) if parts[part].size else 0.0
 
     @property
@@ -73,8 +158,8 @@ class Expansion:
         of the number of samples in which it repeats itself (integrated autocorrelation time). What
         a law gets wrong of a pull lasts for seconds.
         """
-        count = len(self.residuals.samples)
-        return max(_repeated(axis) for axis in self.left[: 3 * count].reshape(3, count))
+        count = len(self.form.residuals.samples)
+        return max(_repeated(axis) for axis in self._residuals[: 3 * count].reshape(3, count))
 
     @property
     def recoil_discrepancy(self) -> float:
@@ -82,8 +167,8 @@ class Expansion:
 
         What a law gets wrong of a recoil moves all of a picture's points together.
         """
-        seen, count = self.residuals, len(self.left) - 2 * len(self.residuals.picture)
-        bins, gone = self.left[count:].reshape(2, -1), seen.gone()
+        seen, bins = self.form.residuals, self._bins
+        gone = seen.gone()
         pictures = [seen.picture == picture for picture in np.unique(seen.picture[seen.recoils])]
         return max(
             (
@@ -97,7 +182,8 @@ class Expansion:
     @property
     def pictures(self) -> list[float]:
         """Times of the pictures in which the recoil is seen, from the release [s]."""
-        seen, episode = self.residuals.picture[self.residuals.recoils], self.residuals.episode
+        residuals = self.form.residuals
+        seen, episode = residuals.picture[residuals.recoils], residuals.episode
         return (episode.cloud_time[np.unique(seen)] - episode.release_time).tolist()
 
 

@@ -1,9 +1,15 @@
 """The mode of the density by Levenberg-Marquardt within bounds, and the Gaussian around it.
 
-    -2 log p(phi | evidence) = sum of the recordings' misfits + that of the launches + priors
+    -2 log p(phi, n | evidence) = |r(phi, n)|^2
 
-Each recording's nuisances are its own and eliminated in it, so that what is left is a few
-coordinates, whatever the number of recordings; and leaving one out is a subtraction.
+r are the residuals of all recordings, whitened, those of the launches, and the priors of the
+coordinates phi and of each recording's own nuisances n. Of r the fit has the slopes J; its step
+least |r + J d|^2, damped, within bounds.
+
+The density has no one form. Points are sorted into bins where a pass begins, and what the loss
+factor does to the force does not count: r is as if that factor were what it is where a step
+begins. So misfits compare within a step, both of one form; and a fit has settled only where a pass
+ends near to where it began.
 """
 
 from __future__ import annotations
@@ -16,18 +22,18 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.identification.posterior.coordinates import Coordinates
+from sling2sim2real.identification.posterior.coordinates import LOSS, Coordinates
 from sling2sim2real.identification.posterior.expansion import Expansion
 from sling2sim2real.identification.posterior.launches import LaunchExpansion, LaunchLikelihood
-from sling2sim2real.identification.posterior.likelihood import Failed, Likelihood
+from sling2sim2real.identification.posterior.likelihood import SIMULATED, Failed, Likelihood
 
-PASSES = 6  # at most; each sorts the points into bins anew, where the last one ended
+PASSES = 4  # at most
 ITERATIONS = 30  # of a pass, at most
 LONGEST = 20.0  # of a step, in those of the finite differences
 STILL = 0.1  # of a last step, in standard deviations: no interval is 1 % wider by as much
 FLAT = 0.2  # of -2 log p: so little that a step which changes it by less tells nothing apart
 NEAR = 1.0  # standard deviations that such a step may go
-LEAST = 1e-12  # of a precision
+LEAST = 1e-6  # of a column's length, where nothing tells a coordinate
 DAMP, HARDER, EASIER, HARDEST = 1e-3, 10.0, 0.05, 1e4  # Levenberg's, relative to the diagonal
 HALF = 1.0  # at least, after a step that went wrong: it halves the next one
 
@@ -38,28 +44,45 @@ class NoFit(UserError):
 
 @dataclass(frozen=True)
 class Fit:
-    """The density around its mode.
+    """The density around a point; that of a fit is its mode.
 
     Attributes:
-        phi: The mode, shape (D,).
-        hessian, gradient: Of -log p there, and of log p: 0 but at bounds; (D, D), (D,).
+        phi: Coordinates, shape (D,).
         nuisances: Of each recording, shape (N, 3).
         expansions: Of each recording there.
         launches: Their expansion there; None without.
-        misfit: -2 log p there, priors included.
+        left, slopes, uncounted: r, J and what of J's loss factor does not count; shapes (Q,),
+            (Q, D + 3 N) and (Q,).
+        hessian, gradient: Of -log p in phi alone, and of log p: 0 but at bounds; (D, D), (D,).
         steps: How many expansions it took.
-        settled: Whether the next step would be small, hardly damped.
+        settled: Whether the fit ended near to where it began to take one form of the density.
     """
 
     phi: np.ndarray
-    hessian: np.ndarray
-    gradient: np.ndarray
     nuisances: np.ndarray
     expansions: list[Expansion]
     launches: LaunchExpansion | None
-    misfit: float
+    left: np.ndarray
+    slopes: np.ndarray
+    uncounted: np.ndarray
+    hessian: np.ndarray
+    gradient: np.ndarray
     steps: int
-    settled: bool
+    settled: bool = False
+
+    @property
+    def misfit(self) -> float:
+        """-2 log p, priors included."""
+        return float(self.left @ self.left)
+
+    def misfit_of(self, other: Fit) -> float:
+        """Another point's in the form that the density has here."""
+        left = other.left - (other.phi[LOSS] - self.phi[LOSS]) * self.uncounted
+        return float(left @ left)
+
+    def size(self, step: np.ndarray) -> float:
+        """Length of a step of coordinates (D,), in standard deviations along it (Mahalanobis)."""
+        return float(np.sqrt(step @ self.hessian @ step))
 
 
 def fit(
@@ -73,12 +96,8 @@ def fit(
 ) -> Fit:
     """Fit coordinates from `start` (D,). Raises NoFit.
 
-    Each pass has a density of one form: bins, and what the loss factor does to the force, are
-    those of its first expansion. Misfits of different passes do not compare. It is settled where
-    a pass ends near to where it began.
-
-    A step into the failure of a recording's simulation, or of a launch that landed, is none. A
-    launch that fails from the start counts as soon as a step makes it land.
+    A step into the failure of a recording's simulation, or of a launch that counts, is none. A
+    launch that fails where a pass begins does not count in it.
 
     Args:
         launches: That are evidence too.
@@ -88,22 +107,21 @@ def fit(
     steps = 0
     with ThreadPoolExecutor(workers) as pool:
 
-        def expanded(phi: np.ndarray, nuisances: np.ndarray, reference: Fit | None) -> Fit:
+        def expanded(phi: np.ndarray, nuisances: np.ndarray, begun: Fit | None) -> Fit:
             nonlocal steps
             steps += 1
-            around = coordinates.parameters, phi, _steps(coordinates, phi)
-            references = reference.expansions if reference else [None] * len(recordings)
+            around = coordinates.parameters, phi, coordinates.differences(phi)
+            forms = [x.form for x in begun.expansions] if begun else [None] * len(recordings)
             expansions = [
-                likelihood.expand(*around, nuisance, pool, fixed)
-                for likelihood, nuisance, fixed in zip(
-                    recordings, nuisances, references, strict=True
-                )
+                likelihood.expand(*around, own, pool, form)
+                for likelihood, own, form in zip(recordings, nuisances, forms, strict=True)
             ]
             launched = launches.expand(*around) if launches else None
-            return _density(coordinates, phi, nuisances, expansions, launched, steps)
+            left_out = begun.launches.failed if begun and begun.launches else None
+            return _stacked(coordinates, phi, nuisances, expansions, launched, left_out, steps)
 
-        phi, nuisances = np.array(start, float), np.zeros((len(recordings), 3))
-        best, near = None, False
+        phi, nuisances = np.array(start, float), np.zeros((len(recordings), len(SIMULATED)))
+        best, settled = None, False
         for _ in range(PASSES):
             try:
                 begun = expanded(phi, nuisances, None)
@@ -113,49 +131,116 @@ def fit(
                     f" fails: {why}"
                 ) from None
             progress(begun)
-            best = _descended(begun, coordinates, expanded, progress)
-            near = _size(best, best.phi - begun.phi) < STILL
+            best, still = _descended(begun, coordinates, expanded, progress)
+            settled = still and best.size(best.phi - begun.phi) < STILL and _same(best, begun)
             phi, nuisances = best.phi, best.nuisances
-            if near or not best.settled:
+            if settled:
                 break
     assert best is not None
-    return replace(best, settled=best.settled and near, steps=steps)
+    return replace(best, settled=settled, steps=steps)
 
 
 def _descended(
-    best: Fit,
+    begun: Fit,
     coordinates: Coordinates,
     expanded: Callable[[np.ndarray, np.ndarray, Fit | None], Fit],
     progress: Callable[[Fit], None],
-) -> Fit:
-    """The mode of one pass by Levenberg-Marquardt from its first expansion."""
-    damp = DAMP
+) -> tuple[Fit, bool]:
+    """Where a pass ends, and whether any further step would be small, hardly damped."""
+    best, damp, count = begun, DAMP, len(begun.phi)
     for _ in range(ITERATIONS):
-        if _size(best, _step(best, coordinates, min(damp, DAMP))) < STILL:
-            return replace(best, settled=True)  # damping makes any step short
+        # Damping makes any step short, also where the fit is stuck.
+        if best.size(_step(best, coordinates, min(damp, DAMP))[:count]) < STILL:
+            return best, True
         step = _step(best, coordinates, damp)
-        nuisances = np.array(
-            [
-                nuisance + expansion.nuisances[0] / (1 + damp) + expansion.nuisances[1] @ step
-                for nuisance, expansion in zip(best.nuisances, best.expansions, strict=True)
-            ]
-        )
+        nuisances = best.nuisances + step[count:].reshape(best.nuisances.shape)
         try:
-            trial = expanded(best.phi + step, nuisances, best)
+            trial = expanded(best.phi + step[:count], nuisances, begun)
         except Failed:
             trial = None
-        if trial and _fails_more(trial, best):
-            trial = None
-        if trial and _nearer(trial, best):
+        misfit = best.misfit_of(trial) if trial else np.inf
+        if trial and misfit < best.misfit:
             best, damp = trial, damp * EASIER
             progress(best)
             continue
-        if trial and trial.misfit < best.misfit + FLAT and _size(best, step) < NEAR:
-            return replace(best, settled=True)
+        if misfit < best.misfit + FLAT and best.size(step[:count]) < NEAR:
+            return best, True
         damp = max(damp * HARDER, HALF)
         if damp > HARDEST:
             break
-    return best
+    return best, False
+
+
+def _step(at: Fit, coordinates: Coordinates, damp: float) -> np.ndarray:
+    """Least of |r + J d|^2, damped, within the bounds and LONGEST, shape (D + 3 N,)."""
+    count, unknowns = len(at.phi), at.slopes.shape[1]
+    size = np.maximum(np.linalg.norm(at.slopes, axis=0), LEAST)
+    design = np.vstack([at.slopes / size, np.sqrt(damp) * np.eye(unknowns)])
+    basis, triangle = np.linalg.qr(design)
+    aim = -basis[: len(at.left)].T @ at.left
+    low, high = np.full((2, unknowns), [[-np.inf], [np.inf]])
+    longest = LONGEST * coordinates.steps
+    low[:count] = np.maximum(coordinates.low - at.phi, -longest)
+    high[:count] = np.minimum(coordinates.high - at.phi, longest)
+    ends = low * size - 1e-12, high * size + 1e-12
+    return np.clip(lsq_linear(triangle, aim, ends, method="bvls").x / size, low, high)
+
+
+def _same(a: Fit, b: Fit) -> bool:
+    """Whether the same launches fail."""
+    return not (a.launches and b.launches and np.any(a.launches.failed != b.launches.failed))
+
+
+def _stacked(
+    coordinates: Coordinates,
+    phi: np.ndarray,
+    nuisances: np.ndarray,
+    expansions: list[Expansion],
+    launched: LaunchExpansion | None,
+    left_out: np.ndarray | None,
+    steps: int,
+) -> Fit:
+    """All evidence at a point. Raises Failed where a launch fails that counts.
+
+    Args:
+        left_out: Which launches do not count; None: those that fail here.
+    """
+    count, own = len(phi), nuisances.shape[1]
+    root = np.sqrt(coordinates.precision)
+    left = [root * (phi - coordinates.expected)]
+    slopes, uncounted = [np.diag(root)], [np.zeros(count)]
+    hessian, gradient = np.diag(coordinates.precision), -root * left[0]
+    if launched:
+        left_out = launched.failed if left_out is None else left_out
+        if (launched.failed & ~left_out).any():
+            raise Failed("a launch that landed fails")
+        left.append(launched.gap[~left_out])
+        slopes.append(-launched.design[:, ~left_out].T)
+        uncounted.append(np.zeros(len(left[-1])))
+        hessian = hessian + launched.hessian
+        gradient = gradient + launched.gradient
+    slopes = [np.pad(rows, ((0, 0), (0, own * len(expansions)))) for rows in slopes]
+    for number, expansion in enumerate(expansions):
+        rows = np.zeros((len(expansion.left), count + nuisances.size))
+        rows[:, :count] = expansion.slopes
+        rows[:, count + own * number : count + own * (number + 1)] = expansion.nuisance_slopes
+        left.append(expansion.left)
+        slopes.append(rows)
+        uncounted.append(expansion.uncounted)
+        hessian = hessian + expansion.hessian
+        gradient = gradient + expansion.gradient
+    return Fit(
+        phi,
+        nuisances,
+        expansions,
+        launched,
+        np.concatenate(left),
+        np.vstack(slopes),
+        np.concatenate(uncounted),
+        hessian,
+        gradient,
+        steps,
+    )
 
 
 def widened(fitted: Fit, coordinates: Coordinates, by: float) -> Fit:
@@ -171,66 +256,3 @@ def widened(fitted: Fit, coordinates: Coordinates, by: float) -> Fit:
     hessian = (fitted.hessian - np.diag(prior)) / by**2 + np.diag(prior)
     gradient = (fitted.gradient * outward - pull) / by**2 + pull
     return replace(fitted, hessian=hessian, gradient=gradient)
-
-
-def _fails_more(trial: Fit, best: Fit) -> bool:
-    """Whether a launch fails that did not."""
-    now, before = trial.launches, best.launches
-    return bool(now and before and (now.failed & ~before.failed).any())
-
-
-def _nearer(trial: Fit, best: Fit) -> bool:
-    """Whether the misfit is less, or a launch lands now: what failed had no misfit to compare."""
-    return trial.misfit < best.misfit or _fails_more(best, trial)
-
-
-def _size(fit: Fit, step: np.ndarray) -> float:
-    """Length of a step (D,), in standard deviations along it: Mahalanobis's distance."""
-    return float(np.sqrt(step @ fit.hessian @ step))
-
-
-def _steps(coordinates: Coordinates, phi: np.ndarray) -> np.ndarray:
-    """Steps of finite differences, away from the upper bounds, shape (D,)."""
-    steps = coordinates.steps
-    return np.where(phi + steps > coordinates.high, -steps, steps)
-
-
-def _density(
-    coordinates: Coordinates,
-    phi: np.ndarray,
-    nuisances: np.ndarray,
-    expansions: list[Expansion],
-    launches: LaunchExpansion | None,
-    steps: int,
-) -> Fit:
-    prior, gap = coordinates.precision, phi - coordinates.expected
-    hessian = sum(expansion.hessian for expansion in expansions) + np.diag(prior)
-    gradient = sum(expansion.gradient for expansion in expansions) - prior * gap
-    misfit = sum(expansion.misfit for expansion in expansions) + float(prior @ gap**2)
-    if launches:
-        hessian, gradient = hessian + launches.hessian, gradient + launches.gradient
-        misfit += launches.misfit
-    return Fit(
-        phi=phi,
-        hessian=hessian,
-        gradient=gradient,
-        nuisances=nuisances,
-        expansions=expansions,
-        launches=launches,
-        misfit=misfit,
-        steps=steps,
-        settled=False,
-    )
-
-
-def _step(fit: Fit, coordinates: Coordinates, damp: float) -> np.ndarray:
-    """Least of the damped quadratic within the bounds and LONGEST, shape (D,)."""
-    longest = LONGEST * coordinates.steps
-    low = np.maximum(coordinates.low - fit.phi, -longest)
-    high = np.minimum(coordinates.high - fit.phi, longest)
-    scale = np.sqrt(np.maximum(np.diag(fit.hessian), LEAST))  # of what nothing tells, too
-    hessian = fit.hessian / np.outer(scale, scale) + damp * np.eye(len(scale))
-    root = np.linalg.cholesky(hessian).T
-    aim = np.linalg.solve(root.T, fit.gradient / scale)
-    ends = low * scale - 1e-12, high * scale + 1e-12
-    return np.clip(lsq_linear(root, aim, ends, method="bvls").x / scale, low, high)

@@ -138,9 +138,9 @@ def fit_posterior(
         fitted = fit(recordings, coordinates, first.phi, **options)
         fitted = replace(fitted, steps=first.steps + fitted.steps)
     for expansion in fitted.expansions:
-        if not len(expansion.residuals.picture):
+        if not len(expansion.form.residuals.picture):
             print(
-                f"note: {expansion.residuals.episode.band}: its pictures show fewer than"
+                f"note: {expansion.form.residuals.episode.band}: its pictures show fewer than"
                 f" {LEAST_POINTS} points in each of {BINS} parts of the band, so its force alone is"
                 " fitted",
                 file=sys.stderr,
@@ -280,9 +280,11 @@ def _told(samples: np.ndarray, mode: float, unit: str) -> dict:
 def _clocks(identified: Identified) -> dict:
     """Release and camera's delay of the first recording, with what its expansion leaves open."""
     expansion, nuisances = identified.fit.expansions[0], identified.fit.nuisances[0]
-    change = expansion.nuisances[1]
+    change = expansion.nuisance_change
     covariance = np.linalg.inv(identified.density.hessian)
-    spread = np.sqrt(expansion.spread**2 + np.einsum("id,de,ie->i", change, covariance, change))
+    spread = np.sqrt(
+        expansion.nuisance_spread**2 + np.einsum("id,de,ie->i", change, covariance, change)
+    )
     release, camera = (SIMULATED.index(name) for name in ("release", "camera"))
     time = identified.recordings[0].episode.release_time + nuisances[release]
     wide = 1.645 * spread

@@ -22,7 +22,7 @@ import numpy as np
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.posterior.alignment import recoil_seen
 from sling2sim2real.identification.posterior.coordinates import LOSS
-from sling2sim2real.identification.posterior.expansion import Expansion, NuisanceProjection
+from sling2sim2real.identification.posterior.expansion import Expansion, Form
 from sling2sim2real.identification.posterior.residuals import Residuals, Rule
 from sling2sim2real.simulator.interaction import Rollouts, interact
 from sling2sim2real.simulator.model import ClampedBand
@@ -197,15 +197,15 @@ class Likelihood:
         steps: np.ndarray,
         nuisances: np.ndarray,
         pool: Executor,
-        reference: Expansion | None = None,
+        form: Form | None = None,
     ) -> Expansion:
         """Expand around coordinates (D,) with finite differences `steps` (D,). Raises Failed.
 
         Args:
             parameters_of: Of coordinates (N, D), as `Coordinates.parameters`.
+            nuisances: The simulated ones, shape (3,).
             pool: Maps over batches of rollouts.
-            reference: Whose bins and whose effect of the loss factor on the force are taken; None:
-                those of the rollout there.
+            form: None: that of the rollout there.
         """
         around = parameters_of(phi + np.vstack([0 * steps, np.diag(steps)]))
         release, _, hand = np.diag(NUDGE)
@@ -216,27 +216,20 @@ class Likelihood:
         ]
         (first, later), (released,), (led,) = pool.map(lambda job: self.simulate(*job), jobs)
         later = replace(later, force=later.force[:1], center_line=later.center_line[:1])
-        residuals = (
-            reference.residuals
-            if reference
-            else Residuals(self.episode, self.sling, self.cutoff, first.center_line[0])
-        )
-        vectors = residuals(first)
+        residuals = form.residuals if form else self._binned(first)
+        here, *others = residuals(first)
         moved = np.concatenate([residuals(rollouts) for rollouts in (released, later, led)])
-        gap = vectors[0]
-        slopes = (vectors[1:] - gap) / steps[:, None]
-        nuisance_slopes = (moved - gap) / NUDGE[:, None]
+        slopes = (np.array(others) - here) / steps[:, None]
+        nuisance_slopes = (moved - here) / NUDGE[:, None]
+        form = form or self._form(residuals, here, nuisance_slopes[SIMULATED.index("camera")])
         # The force tells nothing of the loss factor, the recoil does: a law that lacks slow
         # hysteresis would take the one for the other.
-        if reference:
-            uncounted, origin = reference.uncounted, reference.origin
-        else:
-            uncounted, origin = slopes[LOSS].copy(), float(phi[LOSS])
-            uncounted[3 * len(residuals.samples) :] = 0.0
+        uncounted = slopes[LOSS].copy()
+        uncounted[3 * len(residuals.samples) :] = 0.0
         slopes[LOSS] -= uncounted
-        gap = gap - (phi[LOSS] - origin) * uncounted
-        expansion = self._eliminated(residuals, gap, slopes, nuisance_slopes, nuisances)
-        return replace(expansion, uncounted=uncounted, origin=origin)
+        parts = here, slopes, nuisance_slopes, uncounted
+        prior = self._priors(nuisances), 1 / self.tolerances.simulated
+        return Expansion.of(form, *parts, *prior, origin=float(phi[LOSS]))
 
     def remaining(
         self,
@@ -248,7 +241,7 @@ class Likelihood:
     ) -> np.ndarray:
         """What nuisances leave of the residuals of N parameters, NaN where a simulation fails.
 
-        Its squares add up to -2 log p, in the bins of an expansion and with the nuisances' effects
+        Its squares add up to -2 log p, in the form of an expansion and with the nuisances' effects
         there.
 
         Args:
@@ -256,77 +249,37 @@ class Likelihood:
             loss: The logarithm of the loss factor, shape (N,).
 
         Returns:
-            Shape (N, R + K).
+            Shape (N, Q).
         """
         seen = self.shifted(nuisances)
         until = max(seen.cloud_time, default=np.inf)
         done = interact(self.sling, seen, parameters, until=until, workers=workers)
-        changed = np.outer(loss - expansion.origin, expansion.uncounted)
-        residuals = expansion.residuals(done) - changed
-        left = expansion.elimination(residuals)
+        residuals = expansion.form.whitened(expansion.form.residuals(done))
+        priors = np.tile(self._priors(nuisances), (len(residuals), 1))
+        left = np.hstack([residuals, priors])
+        left = expansion.cleared(left - np.outer(loss - expansion.origin, expansion.uncounted))
         left[[why is not None for why in done.failure]] = np.nan
         return left
 
-    def _eliminated(
-        self,
-        residuals: Residuals,
-        gap: np.ndarray,
-        slopes: np.ndarray,
-        nuisance_slopes: np.ndarray,
-        nuisances: np.ndarray,
-    ) -> Expansion:
-        """Eliminate the nuisances n: a Schur complement of the Gauss-Newton matrix.
+    def _priors(self, nuisances: np.ndarray) -> np.ndarray:
+        """Residuals of the simulated nuisances' own priors, shape (3,).
 
-        Columns of the Jacobian J, over the residuals' spread: D of phi, three of the simulated n,
-        M of the linear n. With the precisions of n's priors on the diagonal,
-
-            J' J = [A  B]      hessian = A - B C^-1 B'      best n = C^-1 (c - B' d)
-                   [B' C]      gradient = a - B C^-1 c
-
-        with (a, c) = J' times what is left of the residuals. In `misfit` the linear n are at their
-        best, and the simulated ones where the rollout was made.
+        Of the camera's clock `moved` was taken beforehand, and belongs to what its prior judges.
         """
-        tolerances = self.tolerances
-        linear = self._linear(residuals, gap, nuisance_slopes[SIMULATED.index("camera")])
-        # Of the camera's clock `moved` was taken beforehand, and belongs to what its prior judges.
-        nuisances = nuisances + self.moved * (np.array(SIMULATED) == "camera")
-        weight = 1 / residuals.spread(tolerances.force, tolerances.cloud, tolerances.way)
-        of_phi, simulated = len(slopes), len(SIMULATED)
-        design = np.concatenate([slopes, nuisance_slopes, linear]) * weight  # (D + 3 + M, R)
-        left = -gap * weight
-        gram, right = design @ design.T, design @ left
-        every_nuisance = slice(of_phi, None)
-        sizes = np.append(tolerances.simulated, np.ones(len(linear)))  # of the nuisances' priors
-        priors = np.append(nuisances / tolerances.simulated, np.zeros(len(linear)))
-        gram[every_nuisance, every_nuisance] += np.diag(sizes**-2)
-        right[every_nuisance] -= priors / sizes
-        m = slice(of_phi + simulated, None)  # linear
-        cost = left @ left + priors @ priors
-        best_linear = np.linalg.solve(gram[m, m], right[m])
-        inverse = np.linalg.inv(gram[every_nuisance, every_nuisance])  # C^-1
-        effects = np.vstack([design[every_nuisance].T, np.diag(1 / sizes)])
-        coupling = gram[:of_phi, every_nuisance]  # B
-        best, change = inverse @ right[every_nuisance], -inverse @ gram[every_nuisance, :of_phi]
-        return Expansion(
-            misfit=float(cost - right[m] @ best_linear),
-            hessian=gram[:of_phi, :of_phi] + coupling @ change,
-            gradient=right[:of_phi] - coupling @ best,
-            nuisances=(best[:simulated], change[:simulated]),
-            spread=np.sqrt(np.diag(inverse)[:simulated]),
-            residuals=residuals,
-            left=(left - best_linear @ design[m]) / weight,
-            elimination=NuisanceProjection(weight, priors, np.linalg.qr(effects)[0]),
-            uncounted=np.zeros(len(left)),
-            origin=0.0,
-        )
+        moved = self.moved * (np.array(SIMULATED) == "camera")
+        return (nuisances + moved) / self.tolerances.simulated
 
-    def _linear(self, residuals: Residuals, gap: np.ndarray, camera: np.ndarray) -> np.ndarray:
-        """Columns of the linear nuisances, each in units of its tolerance, shape (M, R)."""
-        has, changes = self.tolerances, residuals.columns(gap)
+    def _binned(self, rollouts: Rollouts) -> Residuals:
+        return Residuals(self.episode, self.sling, self.cutoff, rollouts.center_line[0])
+
+    def _form(self, residuals: Residuals, here: np.ndarray, camera: np.ndarray) -> Form:
+        """The density's form by residuals (R,) and how the camera's clock changes them, (R,)."""
+        has, changes = self.tolerances, residuals.columns(here)
         sizes = {"force_bias": has.bias, "force_drift": has.drift}
         sizes |= {"force_gain": has.gain, "force_late": has.pose}
         sizes |= {"cloud_shift": has.shift, "cloud_turn": has.turn}
         columns = [sizes[re.sub("_[xyz]$", "", name)] * change for name, change in changes.items()]
         for picture in np.unique(residuals.picture[residuals.recoils]):
             columns.append(has.jitter * np.where(residuals.of_picture(picture), camera, 0.0))
-        return np.array(columns)
+        weight = 1 / residuals.spread(has.force, has.cloud, has.way)
+        return Form.of(residuals, weight, np.array(columns))

@@ -15,7 +15,7 @@ from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.pull import launch_history
 from sling2sim2real.identification.results.theta import PosteriorFile
 from sling2sim2real.simulator.parameters import Parameters
-from sling2sim2real.simulator.rubber import RUBBER
+from sling2sim2real.simulator.rubber import NEO_HOOKEAN, RUBBER
 
 
 class ConfidenceFile(PosteriorFile):
@@ -38,5 +38,6 @@ def load_confidence(path: Path) -> dict:
 
 
 def law_entries(episode: Episode, law: str) -> dict:
-    """What a θ file of a law with memory says of the recorded pull; nothing for another law."""
-    return {"law": RUBBER, "history": launch_history(episode)} if law == RUBBER else {}
+    """What a θ file says of a law: its name, unless neo-Hookean; with memory, the pull."""
+    named = {} if law == NEO_HOOKEAN else {"law": law}
+    return named | ({"history": launch_history(episode)} if law == RUBBER else {})

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sling2sim2real.identification.posterior.expansion import _repeated
+from sling2sim2real.identification.posterior.expansion import Expansion, _repeated
 from sling2sim2real.identification.posterior.likelihood import Likelihood, Tolerances, opening_time
 
 PHI, INNER, FORCES, BINS = 4, 3, 15, 12
@@ -43,9 +43,11 @@ class Case:
     def expanded(self):
         recording = object.__new__(Likelihood)
         recording.tolerances, recording.moved = self.tolerances, 0.0
-        return recording._eliminated(
-            self.residuals, self.gap, self.slopes, self.nuisance_slopes, self.nuisances
-        )
+        camera = self.nuisance_slopes[1]
+        form = recording._form(self.residuals, self.gap, camera)
+        parts = self.gap, self.slopes, self.nuisance_slopes, 0 * self.gap
+        priors = recording._priors(self.nuisances), 1 / self.tolerances.simulated
+        return Expansion.of(form, *parts, *priors, origin=0.0)
 
     def full(self) -> tuple[np.ndarray, np.ndarray]:
         """Design (rows, D + 3 + M) and aim (rows,) of all unknowns, priors as rows."""
@@ -100,14 +102,18 @@ def test_the_covariance_is_the_block_of_the_full_inverse(case):
     block = np.linalg.inv(rows.T @ rows)[:PHI, :PHI]
     np.testing.assert_allclose(np.linalg.inv(expansion.hessian), block, rtol=1e-6)
     given = np.linalg.inv(rows[:, PHI:].T @ rows[:, PHI:])
-    np.testing.assert_allclose(expansion.spread, np.sqrt(np.diag(given)[:INNER]), rtol=1e-6)
+    spread = np.sqrt(np.diag(given)[:INNER])
+    np.testing.assert_allclose(expansion.nuisance_spread, spread, rtol=1e-6)
 
 
 def test_the_best_nuisances_follow_the_coordinates(case):
     expansion, (rows, aim) = case.expanded(), case.full()
     d = np.array([0.1, -0.2, 0.3, 0.05])
-    best = np.linalg.lstsq(rows[:, PHI:], aim - rows[:, :PHI] @ d, rcond=None)[0][:INNER]
-    np.testing.assert_allclose(expansion.nuisances[0] + expansion.nuisances[1] @ d, best, rtol=1e-6)
+    best = [
+        np.linalg.lstsq(rows[:, PHI:], aim - rows[:, :PHI] @ d, rcond=None)[0][:INNER]
+        for d in (d, 0 * d)
+    ]
+    np.testing.assert_allclose(expansion.nuisance_change @ d, best[0] - best[1], rtol=1e-6)
 
 
 def test_the_misfit_has_the_linear_ones_at_their_best_and_the_simulated_as_they_are(case):
@@ -115,9 +121,7 @@ def test_the_misfit_has_the_linear_ones_at_their_best_and_the_simulated_as_they_
     linear = rows[:, PHI + INNER :]
     left = aim - linear @ np.linalg.lstsq(linear, aim, rcond=None)[0]
     assert expansion.misfit == pytest.approx(left @ left, rel=1e-9)
-    has, size = case.tolerances, len(case.gap)
-    sigma = case.spread(has.force, has.cloud, has.way)
-    np.testing.assert_allclose(expansion.left, left[:size] * sigma, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(-expansion.left[: len(case.gap)], left[: len(case.gap)], rtol=1e-6)
 
 
 def test_elimination_leaves_of_any_residuals_what_least_squares_does(case):
@@ -126,7 +130,9 @@ def test_elimination_leaves_of_any_residuals_what_least_squares_does(case):
     some = case.gap + np.random.default_rng(2).normal(0, 0.1, (3, len(case.gap)))
     has = case.tolerances
     sigma = case.spread(has.force, has.cloud, has.way)
-    for residuals, left in zip(some, expansion.elimination(some), strict=True):
+    priors = np.tile(case.nuisances / has.simulated, (3, 1))
+    cleared = expansion.cleared(np.hstack([expansion.form.whitened(some), priors]))
+    for residuals, left in zip(some, cleared, strict=True):
         goal = np.append(-residuals / sigma, aim[len(sigma) :])
         best = np.linalg.lstsq(rows[:, PHI:], goal, rcond=None)[0]
         assert left @ left == pytest.approx(np.sum((goal - rows[:, PHI:] @ best) ** 2), rel=1e-9)

@@ -31,8 +31,8 @@ def target(seen=residuals, slopes=SLOPES) -> SimpleNamespace:
     coordinates = replace(space(), precision=precision)
     slope = np.pad(slopes, ((0, 0), (0, 1))) / SIZE
     hessian = slope.T @ slope + np.diag(coordinates.precision)
-    there = AT * SIZE, hessian, np.zeros(3), np.zeros((0, 3))
-    fitted = Fit(*there, expansions=[], launches=None, misfit=0.0, steps=1, settled=True)
+    there = AT * SIZE, np.zeros((0, 3)), [], None, np.zeros(0), np.zeros((0, 3)), np.zeros(0)
+    fitted = Fit(*there, hessian, gradient=np.zeros(3), steps=1, settled=True)
 
     class Evidence(SimpleNamespace):
         def __call__(self, phi: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from sling2sim2real.identification.posterior.coordinates import STEPS, Coordinates
+from sling2sim2real.identification.posterior.expansion import Expansion
 from sling2sim2real.identification.posterior.likelihood import Failed
 
 NAMES = "mooney_share", "relaxation", "air_drag"
@@ -39,19 +40,15 @@ class Curve:
         self.seen, self.sigma, self.fails = seen, sigma, fails
         self.episode, self.retained, self.requested = SimpleNamespace(band="toy"), [], []
 
-    def expand(self, points, phi, steps, nuisances, pool, reference=None) -> SimpleNamespace:
-        self.retained.append(reference and reference.residuals)
+    def expand(self, points, phi, steps, nuisances, pool, form=None) -> Expansion:
+        self.retained.append(form)
         self.requested.append(phi)
         if self.fails(phi):
             raise Failed("it broke")
-        left, design = (self.seen - curve(phi)) / self.sigma, slopes(phi) / self.sigma
-        return SimpleNamespace(
-            misfit=float(left @ left),
-            hessian=design @ design.T,
-            gradient=design @ left,
-            nuisances=(np.zeros(3), np.zeros((3, 3))),
-            residuals=reference.residuals if reference else len(self.retained),
-        )
+        left, design = (curve(phi) - self.seen) / self.sigma, slopes(phi) / self.sigma
+        form = form or SimpleNamespace(number=len(self.retained), whitened=lambda x: x)
+        parts = left, design, np.zeros((3, len(left))), np.zeros(len(left))
+        return Expansion.of(form, *parts, np.zeros(3), np.ones(3), origin=0.0)
 
 
 def least(recordings, coordinates: Coordinates, start: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 from validation.simulator import (
     agreement,
     at_rest,
+    corotated,
     damping,
     energy,
     free_motion,
@@ -59,6 +60,17 @@ CHECKS = {
     "rubber: random points": lambda bench: rubber.survey(bench, 64),
     "rubber: energy": lambda bench: energy.checks(
         energy.balance(bench, sling=rubber.rubber_of(bench), **rubber.law_parameters())
+    ),
+    "corotated: a string's pull": corotated.pull,
+    "corotated: the kernel's steps": lambda bench: agreement.checks(
+        bench, 1, sling=corotated.corotated_of(bench)
+    ),
+    "corotated: growth of energy": lambda bench: corotated.growth(bench, 4),
+    "corotated: energy": lambda bench: energy.checks(
+        energy.balance(bench, sling=corotated.corotated_of(bench))
+    ),
+    "corotated: launches in finer steps": lambda bench: launching.convergence(
+        bench, 6, sling=corotated.corotated_of(bench)
     ),
 }
 

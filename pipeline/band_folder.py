@@ -13,10 +13,10 @@ import numpy as np
 import pandas as pd
 
 from pipeline.layout import Layout
+from pipeline.params.run import Pair
 from sling2sim2real.api.band_folder import SIZES, BandFile, BandFolder, differences
 from sling2sim2real.api.identification import Identification, fork_of
 from sling2sim2real.api.model import Band, Theta, with_band
-from sling2sim2real.api.settings import Settings
 from sling2sim2real.base.files import replacing_folder
 from sling2sim2real.base.layout import made
 from sling2sim2real.base.schema import read_json
@@ -33,10 +33,8 @@ from sling2sim2real.identification.results.theta import (
 )
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.stretch import recorded_stretch
-from sling2sim2real.settings.run import Pair
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.model import LaunchHistory
-
-OF_A_RUN = "run", "bands", "rig", "floor"  # no settings of a lab
 
 
 def identified(pair: Pair, root: str | Path = ".") -> Identification:
@@ -93,7 +91,7 @@ def write(pair: Pair, root: str | Path = ".") -> dict:
         stored, policy = Stored(layout.policy(pair)), Stored.of_band(temporary)
         sizes = {name: getattr(found.band, name) for name in SIZES}
         other = differences(found.settings, Settings.default())
-        other = {name: values for name, values in other.items() if name not in OF_A_RUN}
+        other.pop("bands", None)
         BandFile(sizes, found.band.preconditioned, (), other).save(folder.band_file)
         found.save(folder.theta)
         shutil.copyfile(stored.network, policy.network)

@@ -28,7 +28,6 @@ from typing import Any
 from ruamel.yaml import YAML, YAMLError
 
 from sling2sim2real.api.model import Band, with_band
-from sling2sim2real.api.settings import Settings
 from sling2sim2real.base.errors import UserError, one_line
 from sling2sim2real.base.files import replacing
 from sling2sim2real.base.fingerprint import fingerprint
@@ -37,6 +36,7 @@ from sling2sim2real.base.layout import NotMade
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.recording.files import SUFFIXES, sha256
 from sling2sim2real.recording.mask_folder import masks_beside
+from sling2sim2real.settings import Settings
 
 BANDS = Path("bands")  # in the working folder
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")

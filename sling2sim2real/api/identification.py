@@ -11,7 +11,6 @@ import numpy as np
 
 from sling2sim2real.api.band_folder import BandFolder
 from sling2sim2real.api.model import Band, Model, Theta
-from sling2sim2real.api.settings import Settings
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_json
 from sling2sim2real.base.layout import NotMade
@@ -21,6 +20,7 @@ from sling2sim2real.identification.results.mounting import Mounting
 from sling2sim2real.identification.results.theta import ThetaFile
 from sling2sim2real.identification.results.units import SI_UNITS
 from sling2sim2real.launching.surface.stored import Stored
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.model import LaunchHistory
 from sling2sim2real.simulator.parameters import Parameters
 

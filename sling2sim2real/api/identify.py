@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 
 from sling2sim2real.api.identification import METHOD, Identification, fork_of
 from sling2sim2real.api.model import Band, Model, Theta, with_band
-from sling2sim2real.api.settings import Settings
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.machine import cores, devices, workers
 from sling2sim2real.episode.episode import Episode
@@ -25,6 +24,7 @@ from sling2sim2real.identification.results.mounting import Mounting
 from sling2sim2real.identification.results.theta import ThetaFile
 from sling2sim2real.identification.search import explore
 from sling2sim2real.launching.trials.stretch import recorded_stretch
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from sling2sim2real.simulator.parameters import Parameters

@@ -13,7 +13,7 @@ from sling2sim2real.base.launches_file import CHECK, LaunchRow
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.launching.trials.spread import Spread, landing_spread
 from sling2sim2real.launching.trials.stretch import recorded_stretch, stretch_of
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.launch import Launches, limited
 from sling2sim2real.simulator.parameters import Parameters
 
@@ -73,7 +73,7 @@ class CardInputs:
     assumed: Sequence[str] = field(default=())
 
     @property
-    def params(self) -> Params:
+    def params(self) -> Settings:
         return self.found.settings
 
     @property

@@ -22,7 +22,6 @@ from sling2sim2real.api.identification import METHOD, Identification
 from sling2sim2real.api.identify import identify, starting_model
 from sling2sim2real.api.launching import draw_for
 from sling2sim2real.api.model import Model, Theta
-from sling2sim2real.api.settings import Settings
 from sling2sim2real.base.disk import expect_writable
 from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.base.files import replacing, replacing_folder, write_json
@@ -37,6 +36,7 @@ from sling2sim2real.identification.results.mounting import Mounting
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.recording import files as bag
 from sling2sim2real.recording.mask_folder import MASK_NAME, masks_beside
+from sling2sim2real.settings import Settings
 
 RECORDING, START, DENSITY = "recordings to episodes", "exploration", "density"
 POLICY, CARD = "policy", "card"

@@ -15,13 +15,13 @@ from sling2sim2real.policy.check import check, figures, verdict
 from sling2sim2real.policy.environment import projectile_start
 from sling2sim2real.policy.export import export
 from sling2sim2real.policy.train import train
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 
 def make_policy(
     folder: Path,
     launcher: Launcher,
-    params: Params,
+    params: Settings,
     band: str,
     method: str,
     theta: dict,

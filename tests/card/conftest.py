@@ -10,10 +10,10 @@ import pytest
 
 from pipeline.band_folder import card_inputs
 from pipeline.layout import Layout
+from pipeline.params import Params, load
+from pipeline.params.run import Pair
 from sling2sim2real.card.inputs import CardInputs
 from sling2sim2real.recording.build import build_episodes
-from sling2sim2real.settings import Params, load
-from sling2sim2real.settings.run import Pair
 from sling2sim2real.simulator.parameters import EXTRA
 from tests import once
 from tests.policy.stored import write_stored

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from pipeline.layout import Layout
+from pipeline.params.run import Pair
 from sling2sim2real import Identification, UserError
 from sling2sim2real.api.band_folder import BandFile, BandFolder
 from sling2sim2real.base.launches_file import write_launches
@@ -19,7 +20,6 @@ from sling2sim2real.cli import fit as module
 from sling2sim2real.cli.fit import fit, folder_of, shown
 from sling2sim2real.identification.results.theta import load_theta
 from sling2sim2real.recording import build
-from sling2sim2real.settings.run import Pair
 from tests.cli.lab import LAB, MASS, NAME, furnish
 from tests.project import contents, write_params_of
 

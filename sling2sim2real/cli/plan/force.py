@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from sling2sim2real.api.identification import Identification
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording.transforms import Transform
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import SetupParams
 from sling2sim2real.simulator.model import BandSizes
 
@@ -44,7 +44,7 @@ class Earlier:
     problem: str | None
 
 
-def read_earlier(path: Path, params: Params) -> Earlier:
+def read_earlier(path: Path, params: Settings) -> Earlier:
     """Read a recording as far as a plan needs it: no pictures. Raises UserError.
 
     Of several pulls, the first that can be used.

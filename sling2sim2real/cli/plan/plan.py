@@ -28,7 +28,7 @@ from sling2sim2real.cli.plan.trajectory import Trajectory
 from sling2sim2real.cli.preflight.check import MASS, expect_long
 from sling2sim2real.recording.frames import FORK
 from sling2sim2real.recording.transforms import Transform
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import Gripper
 
 INFORMATIVE, PAPER = PULLS
@@ -188,7 +188,7 @@ class Plan:
 class KnownBand(NamedTuple):
     """What a plan is made for; `found` and `recordings` of a band that is there."""
 
-    settings: Params
+    settings: Settings
     band: Band
     recordings: list[Path]
     found: Identification | None
@@ -217,7 +217,7 @@ def known_band(place: Path | None, sizes: dict[str, float]) -> KnownBand:
 
 
 def plan_recording(
-    params: Params,
+    params: Settings,
     band: Band,
     *,
     recordings: Sequence[Path] = (),
@@ -294,7 +294,7 @@ def plan_recording(
     )
 
 
-def _earlier(params: Params, recordings: Sequence[Path]) -> Earlier | None:
+def _earlier(params: Settings, recordings: Sequence[Path]) -> Earlier | None:
     """What the first recording tells that can be read. Raises UserError where none can."""
     problem = None
     for path in recordings:
@@ -308,7 +308,7 @@ def _earlier(params: Params, recordings: Sequence[Path]) -> Earlier | None:
 
 
 def _standing(
-    params: Params, earlier: Earlier | None, found: Identification | None
+    params: Settings, earlier: Earlier | None, found: Identification | None
 ) -> tuple[Transform, str | None, str]:
     """Frame O to the robot's base, where that came from (None: from nowhere), the base's name."""
     if earlier is not None:

@@ -25,7 +25,7 @@ from sling2sim2real.recording.events import parts_of
 from sling2sim2real.recording.files import Container, read_container, sha256
 from sling2sim2real.recording.frames import geometry_of
 from sling2sim2real.recording.streams import Recording, recording_of
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import BandParams, SetupParams
 
 MASS = 0.03  # kg: stands for what is not known, and nothing is judged by it
@@ -89,7 +89,7 @@ def expect_long(rest_length: float, setup: SetupParams) -> None:
 
 def look_at(
     path: Path,
-    params: Params,
+    params: Settings,
     band: GivenBand,
     pull: int | None = None,
 ) -> Look:

@@ -11,7 +11,7 @@ from sling2sim2real.cli.command_line import say
 from sling2sim2real.cli.preflight.check import GivenBand, look_at
 from sling2sim2real.cli.preflight.output import expect_writable, written
 from sling2sim2real.cli.preflight.pictures import expect_new, write_pictures
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 DRAWN = "sheet", "rrd", "pictures"
 
@@ -57,7 +57,7 @@ def check(recording: Path, sizes: dict[str, float], **options) -> tuple[str, int
 
 def checked(
     recording: Path,
-    params: Params,
+    params: Settings,
     band: GivenBand,
     *,
     as_json: bool = False,

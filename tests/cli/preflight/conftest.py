@@ -7,7 +7,7 @@ import pytest
 from sling2sim2real.cli.preflight.check import GivenBand, Look, look_at
 from sling2sim2real.recording.build import Processed, process
 from sling2sim2real.recording.events import Part
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import BandParams
 from tests.recording.conftest import blind, masked, params, seen
 
@@ -15,7 +15,7 @@ __all__ = ["blind", "masked", "params", "seen"]
 PROCESSED: dict[str, Processed] = {}
 
 
-def processed_once(part: Part, band: BandParams, params: Params, weighed: bool) -> Processed:
+def processed_once(part: Part, band: BandParams, params: Settings, weighed: bool) -> Processed:
     """`process`, which for equal pulls of a file is worked out once in all these tests."""
     if params.cloud.mask == "folder":  # the masks may be others
         return process(part, band, params, weighed)
@@ -33,7 +33,7 @@ def each_pull_is_processed_once() -> Iterator[None]:
         yield
 
 
-def band_of(params: Params, **sizes: float) -> GivenBand:
+def band_of(params: Settings, **sizes: float) -> GivenBand:
     """What is known of a band by a command line."""
     return GivenBand.of(sizes, params.setup)
 

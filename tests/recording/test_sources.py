@@ -61,9 +61,7 @@ def test_an_odometry_and_one_pose_of_several(params) -> None:
         for k in range(COUNT)
     ]
     for kind, sent in (("nav_msgs/Odometry", odometry), ("foxglove.PosesInFrame", poses)):
-        frame, values = played(
-            chosen(params, wrench("/ft"), channel("/hand", kind, sent))["pose"]
-        )
+        frame, values = played(chosen(params, wrench("/ft"), channel("/hand", kind, sent))["pose"])
         assert frame == "base"
         assert_poses(values)
     assert chosen(params, wrench("/ft"), pose("/a"), channel("/ee", kind, sent))["pose"].channel

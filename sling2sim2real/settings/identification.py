@@ -3,33 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Generic, Literal, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
-from pydantic import AfterValidator, model_validator
+from pydantic import AfterValidator, create_model, model_validator
 
 from sling2sim2real.base.imported import is_import
 from sling2sim2real.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
+from sling2sim2real.parameters import THETA, added_by, parameters
 from sling2sim2real.settings.lab import StepParams
 
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound", bound=float)
 KTop = Annotated[int, Range(1, 50)]
 Law = Literal["neo_hookean", "rubber", "corotated"]  # of the band's material
-# What each has beside the five, and how far its box may reach.
-LAWS: dict[str, dict[str, tuple[float, float]]] = {
-    "neo_hookean": {},
-    "rubber": {
-        "mooney_share": (-1.0, 1.0),
-        "upturn": (0.0, 1.0),
-        "softening": (0.0, 0.9),
-        "relaxation": (0.0, 0.2),
-        "flow": (0.0, 1.0),
-        "log_flow_rate": (-1.0, 6.0),
-    },
-    "corotated": {},
-}
+# What each has beside the parameters of every law, and how far its box may reach.
+LAWS = {law: added_by(law) for law in get_args(Law)}
 LEAST_SQUARES = "least_squares"
-UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
+UNSEEN = tuple(  # what a pull does not show
+    row.name for row in parameters("neo_hookean") if row.coordinate is None
+)
 SEARCHES = ("multistart", LEAST_SQUARES, "de", "bo", "adam")
 STEPS = {  # stages of a search before `theta`; a function of the user's has `search`
     "multistart": ("history", "clusters", "cma"),
@@ -74,19 +66,15 @@ class Box(Section, Generic[Bound]):
         return self
 
 
-YoungsModulus = Annotated[float, Range(1e3, 1e9)]
-PoissonsRatio = Annotated[float, Range(0, 0.495)]
-ElasticityDamping = Annotated[float, Range(1e-6, 1)]
-DynamicFriction = Annotated[float, Range(0, 5)]
-DampingScale = Annotated[float, Range(0, 1)]
+_BOXES: dict[str, Any] = {
+    row.name: Box[Annotated[float, Range(*row.reach)]]
+    for row in parameters("neo_hookean")
+    if row.name in THETA
+}
 
 
-class ParameterBoxes(Section):
-    youngs_modulus: Box[YoungsModulus]
-    poissons_ratio: Box[PoissonsRatio]
-    elasticity_damping: Box[ElasticityDamping]
-    dynamic_friction: Box[DynamicFriction]
-    damping_scale: Box[DampingScale]
+class ParameterBoxes(create_model("_ParameterBoxes", __base__=Section, **_BOXES)):
+    """The box of each of THETA."""
 
 
 class LossParams(Section):
@@ -221,8 +209,8 @@ class MethodParams(MethodDefaults):
 
 
 def parameter_names(law: str) -> tuple[str, ...]:
-    """The parameters of a law, in the order of all tables: θ, then what the law adds."""
-    return (*ParameterBoxes.model_fields, *LAWS[law])
+    """What a search of a law may search, in the order of all tables: THETA, then what it adds."""
+    return (*THETA, *LAWS[law])
 
 
 def methods_by_step(

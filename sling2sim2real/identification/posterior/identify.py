@@ -28,7 +28,7 @@ from sling2sim2real.identification.posterior.likelihood import SIMULATED, Failed
 from sling2sim2real.identification.posterior.residuals import BINS, LEAST_POINTS
 from sling2sim2real.identification.posterior.sampling import SAMPLES, Remaining, samples_of
 from sling2sim2real.identification.results.theta import content_of
-from sling2sim2real.identification.results.units import SI_UNITS
+from sling2sim2real.quantities import QUANTITIES
 from sling2sim2real.settings import Params
 from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.simulator.model import ClampedBand, LaunchHistory
@@ -210,7 +210,7 @@ def confidence(identified: Identified) -> dict:
             entry["fixed"] = True
         parameters[name] = entry
     derived = {
-        name: _told(columns[name], mode[name], SI_UNITS.get(name, "")) | priors[name]
+        name: _told(columns[name], mode[name], QUANTITIES[name].si) | priors[name]
         for name in (*EXTRA, product)
     }
     derived |= _clocks(identified)

@@ -44,7 +44,7 @@ def main() -> None:
     model = s2s.Model(BAND, TRUE, settings=s2s.Settings.coarse())
     episode = s2s.episode_from_arrays(**s2s.rehearse(model))  # or s2s.read_mcap("my.mcap", BAND)
     for name, loss in (("the paper's loss", None), ("force alone", force_alone)):
-        objective = s2s.Objective(model, [episode], method="sling2sim2real", loss=loss)
+        objective = s2s.Objective(model, [episode], method="paper", loss=loss)
         optimizer = Narrowing(len(objective.names), rollouts=320, seed=1, population=16)
         for _ in range(20):
             optimizer.tell(objective(optimizer.ask()))

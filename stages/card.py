@@ -1,22 +1,35 @@
-"""Write one band's card: can it be trusted, its values, three draws, pictures, what would help.
+"""Write a band's card, as one of its recordings has it by the method `run.main`.
 
-    python -m stages.card band1 least_squares
+    python -m stages.card band1
 
-Reads the band's recordings, episodes, mounting, θ, confidence, policy and trials; writes
-reports/bands/<band>/.
+Reads the recording's files, episodes and clamps, and θ, confidence, policy and trials of its pair;
+writes reports/bands/<recording>/: can the band's simulator be trusted, its values, three draws,
+pictures, what would help.
 """
 
 from __future__ import annotations
 
-from sling2sim2real.base.layout import Layout
+from pipeline.layout import Layout
+from sling2sim2real.card.inputs import CardFiles
 from sling2sim2real.card.write import write
-from stages.start import run, started
+from stages.start import recording_of_stage, run
 
 
 def main() -> None:
-    params, band, method = started("band", "method")
-    card = write(params, band, method)
-    print(f"{band} {method}: {card['verdict']}; wrote {Layout().card(band)}/README.md")
+    params, recording = recording_of_stage()
+    layout, pair = Layout(), params.run.pairs[f"{recording.key}-{params.run.main}"]
+    files = CardFiles(
+        name=recording.key,
+        raw=layout.raw(recording),
+        episodes=layout.episodes(recording),
+        clamps=layout.clamps(recording),
+        theta=layout.theta(pair),
+        confidence=layout.confidence(pair),
+        policy=layout.policy(pair),
+        trials=layout.trials(pair),
+    )
+    card = write(params, recording.band, pair.method, files, layout.card(recording))
+    print(f"{recording.key}: {card['verdict']}; wrote {layout.card(recording)}/README.md")
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-"""Turn a band's recordings into its episodes: signals and clouds on one clock, in frame O.
+"""Turn a recording's files into its episodes: signals and clouds on one clock, in frame O.
 
     python -m stages.episode band1
 
-Reads the recordings in data/raw/<band>/; writes data/episodes/<band>/<n>/ for each pull that they
-hold, n = 1, 2, ... by the recording's name, then by time: signals.parquet and clouds.parquet. A
-pull that cannot be used is left out, with a warning; a recording without any that can be used is an
+Reads data/raw/<band>/<recording>/; writes data/episodes/<band>/<recording>/<n>/ for each pull that
+the files hold, n = 1, 2, ... by the file's name, then by time: signals.parquet and clouds.parquet.
+A pull that cannot be used is left out, with a warning; a file without any that can be used is an
 error.
 """
 
@@ -12,36 +12,31 @@ from __future__ import annotations
 
 import sys
 
-from sling2sim2real.base.errors import UserError
+from pipeline.layout import Layout
 from sling2sim2real.base.files import replacing_folder
-from sling2sim2real.base.layout import Layout, NotMade
+from sling2sim2real.base.layout import NotMade
 from sling2sim2real.recording.build import build_episodes
 from sling2sim2real.recording.files import once
-from stages.start import run, started
+from stages.start import recording_of_stage, run
 
 
 def main() -> None:
-    params, band = started("band")
+    params, recording = recording_of_stage()
     layout, number = Layout(), 0
-    recordings = once(layout.recordings(band))
-    if not recordings and params.bands[band].source == "rig":
-        raise NotMade(layout.recording(band))
-    if not recordings:
-        raise UserError(
-            f"{layout.raw(band)}: no recording is in it; `sling add-recording --band {band}"
-            " FILE.mcap` puts one there"
-        )
-    with replacing_folder(layout.episodes(band)) as folder:
-        for path in recordings:
-            episodes, refused = build_episodes(path, band, params)
+    files = once(layout.files(recording))
+    if not files:
+        raise NotMade(layout.recorded(recording))
+    with replacing_folder(layout.episodes(recording)) as folder:
+        for path in files:
+            episodes, refused = build_episodes(path, recording.band, params)
             for reason in refused:
                 print(f"warning: left out: {reason}", file=sys.stderr)
             for episode in episodes:
                 number += 1
-                episode.save(folder / layout.episode(band, number).name)
+                episode.save(folder / str(number))
                 force = episode.metadata["preprocessing"]["peak_force"]
                 print(
-                    f"{band} {number}: {path.name}, grasp {episode.grasp_time:.3f} s,"
+                    f"{recording.key} {number}: {path.name}, grasp {episode.grasp_time:.3f} s,"
                     f" release {episode.release_time:.4f} s, peak force {force:.2f} N,"
                     f" {len(episode.clouds)} clouds",
                     flush=True,

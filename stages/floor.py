@@ -12,19 +12,19 @@ from __future__ import annotations
 
 import sys
 
+from pipeline.layout import Layout
 from rig.oracle.aim import least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.world import World
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_json
-from sling2sim2real.base.layout import Layout
-from stages.start import run, started
+from stages.start import arguments, parameters, run
 
 
 def main() -> None:
-    params, band = started("band")
-    if params.bands[band].source != "rig":
-        raise UserError(f"band {band}: was recorded; only a band of the rig has a floor")
+    (band,), params = arguments("band"), parameters()
+    if band not in params.run.floors:
+        raise UserError(f"{band}: not under run.floors in params.yaml")
     targets = params.trials.targets
     with World(band) as world:
         landing_map = world.landing_map(params.setup, params.floor.map_size)

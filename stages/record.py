@@ -1,23 +1,26 @@
-"""Record one of the virtual rig's bands: data/raw/<band>/<band>.mcap.
+"""Record one of the virtual rig's bands: data/raw/<band>/<recording>/.
 
-python -m stages.record band1
+python -m stages.record band1-dips
 """
 
 from __future__ import annotations
 
+from pipeline.layout import Layout
 from rig.recorder.record import record
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.layout import Layout
-from stages.start import run, started
+from stages.start import recording_of_stage, run
 
 
 def main() -> None:
-    params, band = started("band")
-    if params.bands[band].source != "rig":
-        raise UserError(f"{band}: not a band with source: rig in params.yaml")
-    if band not in params.rig.bands:
-        raise UserError(f"{band}: rig.bands in params.yaml does not say what it is made of")
-    record(params, band, Layout().recording(band), lambda line: print(line, flush=True))
+    params, recording = recording_of_stage()
+    if recording.key not in params.run.rig:
+        raise UserError(f"{recording.key}: not under run.rig in params.yaml")
+    path = Layout().recorded(recording)
+    record(params, recording.band, path, print_line, recording=recording.recording)
+
+
+def print_line(line: str) -> None:
+    print(line, flush=True)
 
 
 if __name__ == "__main__":

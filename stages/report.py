@@ -8,12 +8,12 @@ Fails, and says which stage is missing, where an expected input is not there.
 from __future__ import annotations
 
 from pipeline.report.write import write
-from stages.start import run, started
+from stages.start import arguments, parameters, run
 
 
 def main() -> None:
-    (params,) = started()
-    write(params)
+    arguments()
+    write(parameters())
     print("wrote reports/README.md")
 
 

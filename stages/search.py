@@ -1,31 +1,31 @@
-"""Search the box of parameters with one optimiser, to the end.
+"""Search the box of parameters by one search alone, to the end.
 
-    python -m stages.search band1 real2sim2real
+    python -m stages.search band1-real2sim2real
 
-The stages `de`, `bo`, `adam` and `search` of dvc.yaml run it, each for the methods that search so.
-Reads data/episodes/<band>/ and data/clamps/<band>.json; writes everything evaluated to
-data/evaluations/<band>/<method>.parquet, and data/confidence/<band>/<method>.json, which has no
-samples. Killed, it begins anew. SLING_DEVICE and SLING_WORKERS say where it runs.
+Reads data/episodes/ and data/clamps/ of the pair's recording; writes everything evaluated to
+data/evaluations/<pair>.parquet, and data/confidence/<pair>.json, which has no samples. Killed, it
+begins anew. SLING_DEVICE and SLING_WORKERS say where it runs.
 """
 
 from __future__ import annotations
 
-from sling2sim2real.base.layout import Layout
-from sling2sim2real.identification.objective.session import load_episode, logging_evaluator
+from pipeline.layout import Layout
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.identification.objective.session import logging_evaluator
 from sling2sim2real.identification.results.confidence_file import law_entries, save_confidence
 from sling2sim2real.identification.search import explore, rollouts_of
-from stages.start import run, started
+from stages.start import pair_of_stage, run
 
 
 def main() -> None:
-    params, band, method = started("band", "method")
-    layout, rollouts = Layout(), rollouts_of(params, method)
-    evaluations = explore(
-        params, method, logging_evaluator("search", band, method, params, rollouts)
-    )
-    evaluations.save(layout.evaluations(band, method))
-    entries = law_entries(load_episode(band), params.methods[method].law)
-    save_confidence(layout.confidence(band, method), band, entries)
+    params, pair = pair_of_stage()
+    layout, rollouts = Layout(), rollouts_of(params, pair.method)
+    episode = Episode.load(layout.episode(pair))
+    recorded = pair.band, pair.method, episode, layout.clamps(pair)
+    evaluate = logging_evaluator(f"search-{pair.key}", params, *recorded, rollouts)
+    explore(params, pair.method, evaluate).save(layout.evaluations(pair))
+    entries = law_entries(episode, params.methods[pair.method].law)
+    save_confidence(layout.confidence(pair), pair.band, entries)
 
 
 if __name__ == "__main__":

@@ -12,27 +12,20 @@ from threading import Thread
 
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.layout import Layout, NotMade, owner
-from sling2sim2real.settings import Params, expect_known, load
-from sling2sim2real.settings.identification import steps_of
-
-MAKERS = {  # steps that make a folder of another name
-    "raw": "record",
-    "episodes": "episode",
-    "launches": "evidence",
-    "policies": "policy",
-}
-
-OF_A_SEARCH = ("history", "clusters", "evaluations", "confidence")  # its last step writes the rest
+from sling2sim2real.base.layout import NotMade
+from sling2sim2real.settings import Params, load
+from sling2sim2real.settings.run import Pair, Recording
 
 OF_DVC = "DVC_STAGE"  # in the environment of what DVC runs
 OF_FLOW = "SLING_FLOW"  # process id of the `sling` command that started that DVC
 OF_EXPERIMENT = "DVC_EXP_NAME"  # the same, of `dvc exp run`
 GRACE = 5.0  # s from the interrupt to the end
+MAKERS = {"raw": "record", "episodes": "episode", "policies": "policy"}  # others: as the folder
+LAST_OF = {"multistart": "cma", "posterior": "posterior", "search": "search"}
 
 
 def arguments(*names: str) -> list[str]:
-    """Return as many arguments as `names` (band, method); else print the usage and exit with 2."""
+    """Return as many arguments as `names`; else print the usage and exit with 2."""
     given = sys.argv[1:]
     if len(given) != len(names) or any(argument.startswith("-") for argument in given):
         script = f"stages.{Path(sys.argv[0]).stem}"
@@ -41,24 +34,41 @@ def arguments(*names: str) -> list[str]:
     return given
 
 
-def started(*names: str) -> tuple[Params, *tuple[str, ...]]:
-    """params.yaml and the stage's arguments, each of which it must know. Raises UserError.
+def parameters() -> Params:
+    """params.yaml. Raises UserError.
 
     Where `dvc exp run -S` has written what is refused, the error says how to take it back.
     """
-    given = arguments(*names)
     try:
-        params = load()
+        return load()
     except UserError as error:
         if OF_EXPERIMENT in os.environ and Path.cwd() == Path(os.environ["DVC_ROOT"]):
             raise UserError(
-                f"{error}; DVC wrote it there: `sling reset KEY` takes it back, and"
+                f"{error}; DVC wrote it there: `git checkout params.yaml` takes it back, and"
                 " `dvc exp run --temp` leaves params.yaml alone"
             ) from error
         raise
-    for name, value in zip(names, given, strict=True):
-        expect_known(params, name, value)
-    return params, *given
+
+
+def recording_of_stage() -> tuple[Params, Recording]:
+    """params.yaml, and the recording that the stage's argument names. Raises UserError."""
+    (name,) = arguments("recording")
+    params = parameters()
+    return params, known(params.run.recordings, name, "run.recordings")
+
+
+def pair_of_stage() -> tuple[Params, Pair]:
+    """params.yaml, and the pair that the stage's argument names. Raises UserError."""
+    (name,) = arguments("recording-method")
+    params = parameters()
+    return params, known(params.run.pairs, name, "run.pairs")
+
+
+def known(entries: dict, name: str, where: str):
+    """The entry of that name. Raises UserError, which says where in params.yaml it was sought."""
+    if name not in entries:
+        raise UserError(f"{name}: not under {where} in params.yaml, which has {', '.join(entries)}")
+    return entries[name]
 
 
 def run(main: Callable[[], int | None]) -> None:
@@ -96,54 +106,31 @@ def _end_with_dvc() -> None:
 
 
 def remedy(error: NotMade) -> str:
-    """Describe how a user gets a file, or gets it anew; "" where no stage makes it."""
-    owner_of_path = owner(error.path)
-    if owner_of_path is None:
-        return ""
-    folder, band, method = owner_of_path
-    if folder == "raw" and band not in (*load().run.rig, *load().run.dips):
-        return f"`sling add-recording --band {band} FILE.mcap` puts a recording there"
-    params = load()
+    """Describe how a user gets a file of data/, or gets it anew; "" of any other file."""
+    parts = error.path.with_suffix("").parts
+    after = parts[::-1].index("data") if "data" in parts else 0
+    run = load().run
+    match parts[len(parts) - after :]:
+        case "launches", *_:
+            return "a CSV with the header draw_y,draw_z,error,landing,use will do"
+        case "raw" | "episodes" | "clamps" as folder, band, recording, *_:
+            key, entries = (
+                Recording.model_construct(band=band, recording=recording).key,
+                run.recordings,
+            )
+        case "floor" as folder, key, *_:
+            entries = run.floors
+        case folder, key, *_:
+            entries = run.pairs
+        case _:
+            return ""
+    if folder == "raw" and key not in run.rig:
+        return "put MCAP files there"
+    if key not in entries:
+        return f"no entry of `run` in params.yaml makes {key}"
     step = MAKERS.get(folder, folder)
-    if folder in OF_A_SEARCH and method in params.methods:
-        steps = steps_of(params.methods[method].search)
-        step = folder if folder in steps else steps[-1]
-    elif error.path.name == "launches.parquet":
-        step = "launches"
-    stage = stage_of(params, step, band, method)
-    if stage is None:
-        what = f"{method} under run.methods or run.ablations" if method else f"{band} under run.own"
-        return f"name {what} in params.yaml, then `dvc repro` makes it"
+    if folder in ("evaluations", "confidence"):
+        step = next(step for kind, step in LAST_OF.items() if key in getattr(run, kind))
     if error.problem != "missing":
-        return f"`dvc repro --force {stage}` makes it anew"
-    return f"`dvc repro {stage}` makes it"
-
-
-def stage_of(params: Params, step: str, band: str, method: str | None = None) -> str | None:
-    """The stage of a step for a band, and a method; None where `run` lets them not meet."""
-    requested = params.run
-    item = band if method is None else f"{band}-{method}"
-    for group, bands, methods in (
-        ("", requested.bands, requested.methods),
-        ("own_", requested.own, requested.methods[:1]),
-        ("dip_", requested.dips, requested.methods[:1]),
-        ("ablation_", requested.ablations.bands, requested.ablations.methods),
-    ):
-        if band in bands and method in (None, *methods):
-            return f"{group}{step}@{item}"
-    return None
-
-
-def ungrouped(step: str) -> str:
-    """The step of a stage's, without what stage_of puts before it."""
-    return step.removeprefix("ablation_").removeprefix("own_").removeprefix("dip_")
-
-
-def unmounted(params: Params, band: str, root: str | Path = ".") -> list[str]:
-    """A warning where nothing is known of how a band hangs: simulations go on without."""
-    path = Layout(Path(root)).clamps(band)
-    if path.exists():
-        return []
-    stage = stage_of(params, "clamps", band)
-    mended = f"; `dvc repro {stage}` fits it to a recording" if stage else ""
-    return [f"{path} is missing, so the band hangs as `setup` says{mended}"]
+        return f"`dvc repro --force {step}@{key}` makes it anew"
+    return f"`dvc repro {step}@{key}` makes it"

@@ -1,35 +1,35 @@
 """Choose θ* from everything that a search evaluated.
 
-    python -m stages.theta band1 sling2sim2real
+    python -m stages.theta band1-paper
 
-Reads data/evaluations/ and data/confidence/ of the method; writes data/theta/<band>/<method>.json.
+Reads data/evaluations/ and data/confidence/ of the pair; writes data/theta/<pair>.json.
 θ* is the mode of the density where one was fitted, which alone says how sure θ* is; else it is the
 best of all evaluations, and "confidence" is null.
 """
 
 from __future__ import annotations
 
+from pipeline.layout import Layout
 from sling2sim2real.base.files import write_json
-from sling2sim2real.base.layout import Layout, made
+from sling2sim2real.base.layout import made
 from sling2sim2real.identification.evaluations import Evaluations, theta_content
 from sling2sim2real.identification.results.confidence_file import load_confidence
 from sling2sim2real.settings.identification import parameter_names
-from sling2sim2real.settings.provenance import settings_of
-from stages.start import run, started
+from stages.start import pair_of_stage, run
 
 
 def main() -> None:
-    params, band, method = started("band", "method")
-    method_params, layout = params.methods[method], Layout()
+    params, pair = pair_of_stage()
+    band, method, layout = pair.band, pair.method, Layout()
+    method_params = params.methods[method]
     names = parameter_names(method_params.law)
-    evaluations = Evaluations.load(method, names, made(layout.evaluations(band, method)))
-    entries = load_confidence(layout.confidence(band, method))
+    evaluations = Evaluations.load(method, names, made(layout.evaluations(pair)))
+    entries = load_confidence(layout.confidence(pair))
     if not method_params.mounting:  # the clamps were left as `setup` says
         entries["mounted"] = False
     content = theta_content(evaluations, band, entries)
-    content["made_with"] = settings_of(params, band, method) | entries.get("made_with", {})
-    write_json(layout.theta(band, method), content)
-    print(f"{band} {method}: loss {content['loss']['total']:.5g}")
+    write_json(layout.theta(pair), content)
+    print(f"{pair.key}: loss {content['loss']['total']:.5g}")
     intervals = (content["confidence"] or {}).get("parameters", {})
     for name, value in content["theta"].items():
         print(f"  {name} {value:.4g}{_interval(intervals.get(name))}")

@@ -1,56 +1,68 @@
-"""Predict what the policy of one band and method launches, beside what it led to.
+"""Launch with a policy, on the rig where that has its band, and predict where launches land.
 
-    python -m stages.trials band1 sling2sim2real
+    python -m stages.trials band1-paper
 
-Reads data/policies/, data/theta/, data/confidence/, data/clamps/ and data/episodes/, and the
-band's data/launches/<band>/scores.json; writes data/trials/<band>/<method>.parquet. A rig band has
-launches of the rig beside its policy. For a recorded band the calibrated simulator predicts the
-measured launches, or else the policy's own.
+Reads data/policies/, data/theta/ and data/confidence/ of the pair, data/clamps/ and data/episodes/
+of its recording, and data/launches/<band>.csv, whose launches to check are trials too; writes
+data/trials/<pair>.parquet. Launches on the rig of equal target and number have the same errors, for
+every method and policy. Without any launch the simulator predicts the policy's own.
 """
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from sling2sim2real.base.layout import Layout
+from pipeline.layout import Layout
+from rig.physics.launch import Trial, launch
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.theta import load_samples, load_theta, parameters_of
+from sling2sim2real.launching.launches_file import read_launches
 from sling2sim2real.launching.surface.simulator import simulator
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials import trials
-from sling2sim2real.launching.trials.measured import load_scores
 from sling2sim2real.launching.trials.stretch import recorded_stretch, stretch_of
-from stages.start import run, started
+from sling2sim2real.settings import load
+from stages.start import pair_of_stage, run
 
 
 def main() -> None:
-    params, band, method = started("band", "method")
-    band_params, fork_width = params.bands[band], params.setup.fork_width
+    params, pair = pair_of_stage()
+    band_params, fork_width = params.bands[pair.band], params.setup.fork_width
     layout = Layout()
-    theta = load_theta(layout.theta(band, method), band)
-    samples = load_samples(layout.confidence(band, method), parameters_of(theta))
-    episodes = Episode.load_all(layout.episodes(band))
+    theta = load_theta(layout.theta(pair), pair.band)
+    samples = load_samples(layout.confidence(pair), parameters_of(theta))
+    episodes = Episode.load_all(layout.episodes(pair))
+    stored = Stored(layout.policy(pair))
 
-    batches = trials.scored(load_scores(layout.scores(band)), method)
+    batches = trials.scored(read_launches(layout.launches(pair.band)), pair.method)
     if band_params.source == "rig":
-        batches = [trials.Batch.load(layout.launches(band, method)), *batches]
-    batches = batches or [trials.aimed(Stored(band, method), list(params.trials.targets))]
+        targets = np.repeat(params.trials.targets, params.trials.repeats).tolist()
+        aimed = trials.aimed(stored, targets)
+        batches = [trials.launch_virtually(aimed, partial(_launch, pair.band)), *batches]
+    batches = batches or [trials.aimed(stored, list(params.trials.targets))]
 
-    launcher = simulator(params, band, theta)
+    launcher = simulator(params, pair.band, theta, layout.clamps(pair))
     launches, intervals = trials.predict(batches, launcher, samples, params)
     draws = np.concatenate([batch.draws for batch in batches])
     table = trials.table(
-        band,
-        method,
+        pair.band,
+        pair.method,
         batches,
         predicted=launches,
         intervals=intervals,
         stretch=stretch_of(np.insert(draws, 0, 0, axis=1), fork_width, band_params.rest_length),
         recorded=recorded_stretch(episodes, fork_width, band_params.rest_length),
     )
-    trials.save(table, layout.trials(band, method))
+    trials.save(table, layout.trials(pair))
     counts = [f"{batch.kind} {len(batch.draws)}" for batch in batches]
-    print(f"{band} {method}: launches: {', '.join(counts)}")
+    print(f"{pair.key}: launches: {', '.join(counts)}")
+
+
+def _launch(band: str, draw: np.ndarray, number: int) -> Trial:
+    """A launch in a process of its own, which reads the parameters: they cannot be sent there."""
+    return launch(band, load(), draw, number)
 
 
 if __name__ == "__main__":

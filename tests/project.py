@@ -10,9 +10,7 @@ import psutil
 from ruamel.yaml import YAML
 
 from sling2sim2real.base.code import ROOT
-from sling2sim2real.settings.identification import steps_of
-from sling2sim2real.settings.lab import StepParams
-from validation.projects import DEFAULTS, environment, wait
+from validation.projects import DEFAULTS, environment, run_of, wait
 
 # What params.yaml has of a band of one's own.
 BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
@@ -25,23 +23,6 @@ def python(*arguments: str | Path, folder: Path = ROOT, **more: str) -> subproce
     return subprocess.run(command, cwd=folder, env=environment(**more), timeout=240, **options)
 
 
-def set_methods(content: dict, methods: list[str], ablations: list[str] | tuple = ()) -> None:
-    """Write into the content of a params.yaml which methods run, and by which steps."""
-    searches = content["methods"], content["method_defaults"]["search"]
-    run, more = content["run"], content["run"]["ablations"]
-    run["methods"], more["methods"] = list(methods), list(ablations)
-    for place, key, names in (
-        (run, "steps", methods),
-        (run, "own_steps", methods[:1]),
-        (more, "steps", ablations),
-    ):
-        place[key] = {step: [] for step in StepParams.model_fields}
-        for name in names:
-            for step in steps_of(searches[0][name].get("search", searches[1])):
-                if step in place[key]:
-                    place[key][step].append(name)
-
-
 def write_params_of(
     root: Path, band: str, method: str, mass: float, **sections: Mapping[str, object]
 ) -> None:
@@ -52,9 +33,7 @@ def write_params_of(
     """
     yaml = YAML()
     content = yaml.load(DEFAULTS)
-    content["run"].update(bands=[band], rig=[], dips=[])
-    content["run"]["ablations"].update(bands=[], rig=[])
-    set_methods(content, [method])
+    content.update(run_of({band: [method]}, rig=False))
     content["bands"][band] = BAND | {"mass": mass}
     for name, values in sections.items():
         content[name].update(values)

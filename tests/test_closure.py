@@ -7,26 +7,19 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from ruamel.yaml import YAML
 
 from sling2sim2real.base import code as of_project
 from sling2sim2real.base.code import CODE, NESTED, ROOT, UNTRACKED, closure
-from stages.start import ungrouped
+from sling2sim2real.settings.identification import OWN, SEARCHES
 from tests.project import write_files
-from tools.closure import BY_NAME, folders, script_of
+from tools.closure import BY_NAME, folders, script_of, stages
 
-STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
+STAGES = stages()
 HIDDEN = "rig/"
 MAY_SEE_THE_RIG = {
     "stages/record.py",
-    "stages/launches.py",
     "stages/floor.py",
-}
-SEARCHES = {
-    "history": "differential_evolution",
-    "de": "differential_evolution",
-    "bo": "bayesian",
-    "adam": "adam",
+    "stages/trials.py",
 }
 ORACLE = "rig/oracle/"
 PROOF = "validation/campaigns/"  # which holds what was identified against the truth
@@ -55,27 +48,21 @@ def relative(file: Path) -> str:
 def test_stages_list_the_folders_that_they_run() -> None:
     for name, stage in STAGES.items():
         listed = [dep for dep in stage["deps"] if dep.startswith(CODE)]
-        search = SEARCHES.get(ungrouped(name))
-        by_name = {f"{BY_NAME}{search}.py"} if search else set()
-        code = sorted({*folders(script_of(stage)), *by_name})
-        assert listed == code, f"{name}: run `python tools/closure.py --fix`"
+        code = {*folders(script_of(stage)), *filter(None, [BY_NAME.get(name)])}
+        assert {*listed} == code, f"{name}: `python tools/closure.py` says what differs"
         assert len(listed) <= 13
 
 
 def test_what_a_run_may_leave_empty_is_in_git() -> None:
     """DVC refuses to report where a folder that it reads is not there."""
-    ends = {"clusters", "density", "de", "bo", "adam", "search"}  # one of them each method has
-    for dep in (dep for dep in STAGES["report"]["deps"] if dep.startswith("data/")):
-        writers = [
-            stage["matrix"]
-            for name, stage in STAGES.items()
-            if ungrouped(name) == name
-            and any(str(out).startswith(f"{dep}/") for out in stage["outs"])
-        ]
-        lists = {str(writer.get("method", writer["band"])) for writer in writers}
-        steps = {name.partition("run.steps.")[2].rstrip("}") for name in lists}
-        if steps != ends and ("" not in steps or lists == {"${run.rig}"}):
-            assert (ROOT / dep / ".gitkeep").is_file(), dep
+    for name in ("clusters", "floor"):  # no multistart, no band of the rig
+        assert f"data/{name}" in STAGES["report"]["deps"]
+        assert (ROOT / "data" / name / ".gitkeep").is_file(), name
+
+
+def test_each_search_of_ours_has_its_own_code_as_a_dependency() -> None:
+    for search in (*SEARCHES[2:], OWN):
+        assert (ROOT / BY_NAME["search"].replace("${item.search}", search)).is_file(), search
 
 
 def test_every_script_is_a_stage() -> None:
@@ -98,7 +85,7 @@ def test_the_oracle_feeds_no_method() -> None:
         name = relative(file)
         seen = [relative(other) for other in imports(file) if relative(other).startswith(ORACLE)]
         assert not seen or name.startswith(MAY_ASK_THE_ORACLE), f"{name} imports {seen[0]}"
-    for stage in ("history", "cma", "density", "theta", "policy", "launches", "trials"):
+    for stage in ("history", "cma", "posterior", "search", "theta", "policy", "trials"):
         reached = closure(ROOT / "stages" / f"{stage}.py")
         assert not any(other.startswith(ORACLE) for other in reached), stage
 

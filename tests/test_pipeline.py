@@ -18,41 +18,45 @@ from ruamel.yaml import YAML
 
 from pipeline.flow.dvc import graph_of
 from rig.physics import compiled
-from tests.project import ROOT, contents, until
+from sling2sim2real.launching.launches_file import write_launches
+from tests.project import BAND, ROOT, contents, until
+from tools.closure import stages
 from validation.projects import TINY, MarkedRun, ProjectCopy, copy_project, run_of
 
 pytestmark = pytest.mark.slow
-METHODS = ["least_squares", "sling2sim2real"]
-OURS, PAPER = METHODS
-OWN = "mine"  # a band of the user's own, by the first method alone
-SEARCH = {OURS: ["history", "density"], PAPER: ["history", "clusters", "cma"], "bo": ["bo"]}
-
-
-def of_method(method: str, first: str = "", band: str = "band1") -> set[str]:
-    """Stages of a method, from one step on."""
-    is_own = band == OWN
-    kind = "own_" if is_own else "" if method in METHODS else "ablation_"
-    steps = [*SEARCH[method], "theta", "policy", *([] if is_own else ["launches"]), "trials"]
-    return {f"{kind}{step}@{band}-{method}" for step in steps[steps.index(first or steps[0]) :]}
-
-
-def of_band(*steps: str, band: str = "band1") -> set[str]:
-    return {f"{'own_' if band == OWN else ''}{step}@{band}" for step in steps}
-
-
-OWN_CHAIN = {
-    *of_band("episode", "clamps", "evidence", "card", band=OWN),
-    *of_method(OURS, band=OWN),
+METHODS = ["posterior", "paper", "bo"]
+OURS, PAPER, BO = METHODS
+MINE = "mine"  # a band of the user's own, by the main method
+SEARCH = {
+    OURS: ["history", "posterior"],
+    PAPER: ["history", "clusters", "cma"],
+    BO: ["search"],
 }
+LAUNCH = "-0.3,-0.17,,2.0,fit\n"
+
+
+def of_pair(recording: str, method: str, first: str = "") -> set[str]:
+    """Stages of a method on a recording, from one step on."""
+    steps = [*SEARCH[method], "theta", "policy", "trials"]
+    return {f"{step}@{recording}-{method}" for step in steps[steps.index(first or steps[0]) :]}
+
+
+def of(name: str, *steps: str) -> set[str]:
+    return {f"{step}@{name}" for step in steps}
+
+
+def both(first: str) -> set[str]:
+    """Stages of the main method on both bands, from one step on."""
+    return of_pair("band1", OURS, first) | of_pair(MINE, OURS, first)
+
+
+OF_MINE = {*of(MINE, "episode", "clamps", "card"), *of_pair(MINE, OURS)}
 EVERYTHING = {
-    *of_band("record", "episode", "clamps", "evidence", "floor", "card"),
-    *(stage for method in SEARCH for stage in of_method(method)),
-    *OWN_CHAIN,
+    *of("band1", "record", "episode", "clamps", "floor", "card"),
+    *(stage for method in METHODS for stage in of_pair("band1", method)),
+    *OF_MINE,
     "report",
 }
-
-
-LAUNCH = "draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.17,2.0\n"
 
 
 class Copy(ProjectCopy):
@@ -68,10 +72,13 @@ class Copy(ProjectCopy):
         (folder.parent / "audit").mkdir()
         copy_project(folder)
         share_compiled(folder)
-        self.set(TINY | run_of(["band1"], METHODS, ["bo"]))
-        band = {"source": "recording", "mass": 0.023, "diameter": 0.010, "rest_length": 0.52}
-        self.set({"run.own": [OWN], f"bands.{OWN}": band})
-        (folder / "data/evidence/band1.csv").write_text(LAUNCH, "utf-8")
+        run = run_of({"band1": METHODS, MINE: [OURS]})["run"]
+        run |= {"floors": ["band1"], "rig": {"band1": run["recordings"]["band1"]}}
+        self.set(TINY | {"run": run, f"bands.{MINE}": BAND | {"mass": 0.023}})
+        for band in ("band1", MINE):
+            write_launches(folder / "data/launches" / f"{band}.csv", [])
+        with (folder / "data/launches/band1.csv").open("a", encoding="utf-8") as file:
+            file.write(LAUNCH)
         self.commit()
 
     def status(self) -> dict[str, list[str]]:
@@ -109,11 +116,11 @@ def share_compiled(copy: Path) -> None:
 def project(tmp_path_factory: pytest.TempPathFactory) -> Copy:
     """After a run; the recording of a user's band is that of the rig's."""
     copy = Copy(tmp_path_factory.mktemp("project") / "copy")
-    recorded = of_band("record")
+    recorded = of("band1", "record")
     assert copy.dvc("repro", *recorded) == recorded
-    recording = copy.folder / f"data/raw/{OWN}/{OWN}.mcap"
-    recording.parent.mkdir()
-    shutil.copy(copy.folder / "data/raw/band1/band1.mcap", recording)
+    recording = copy.folder / f"data/raw/{MINE}/plain/mine.mcap"
+    recording.parent.mkdir(parents=True)
+    shutil.copy(copy.folder / "data/raw/band1/plain/band1.mcap", recording)
     assert copy.dvc("repro") == EVERYTHING - recorded
     return copy
 
@@ -125,7 +132,10 @@ def test_a_run_leaves_only_its_lock_and_report_for_git(project: Copy) -> None:
     assert all(name == "dvc.lock" or name.startswith("reports/") for name in changed)
 
 
-OF_OTHER_RECORDINGS = {"setup.urdf"}
+def _filled(place: str, marks: dict[str, str]) -> str:
+    for mark, value in marks.items():
+        place = place.replace(mark, value)
+    return place
 
 
 def covers(listed: str, read: str) -> bool:
@@ -134,52 +144,42 @@ def covers(listed: str, read: str) -> bool:
 
 def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
     """Neither more, or it would run in vain, nor less, or a change would do nothing."""
-    stages = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
-    project("sh", "stages/run.sh", "search", "band1", "de")  # alone: the rest is as by `bo`
-    for folder in ("evaluations", "confidence"):
-        for file in (project.folder / "data" / folder / "band1").glob("de.*"):
-            file.unlink()
     everything_read, idle_keys = set(), {}
-    for name in (*EVERYTHING, "ablation_de@band1-de"):
-        step, *item = name.removeprefix("ablation_").removeprefix("own_").split("@")
-        script = "@".join([stages[step]["cmd"].split()[2].removeprefix("stages."), *item])
-        if step == "card":  # of the first method
-            script += f"-{METHODS[0]}"
-        band, _, method = item[0].partition("-") if item else ("", "", "")
-        listed = [
-            key.replace("${item.band}", band)
-            .replace("${item.method}", method)
-            .replace("${run.methods[0]}", METHODS[0])
-            for key in stages[step].get("params", [])
-        ]
-        notes = list((project.folder.parent / "audit").glob(f"{script}.*.json"))
+    run = YAML(typ="safe").load(project.folder / "params.yaml")["run"]
+    for name in EVERYTHING:
+        step, _, key = name.partition("@")
+        item = run["pairs"].get(key) or run["recordings"].get(key, {})
+        marks = {f"${{item.{field}}}": value for field, value in item.items()}
+        marks |= {"${item}": key, "${run.main}": OURS}
+        listed = [_filled(place, marks) for place in stages()[step].get("params", [])]
+        notes = list((project.folder.parent / "audit").glob(f"{name}.*.json"))
         assert notes, f"{name} left no note of what it read"
         read = {key for note in notes for key in json.loads(note.read_text())}
+        if step != "report":  # which of them it is for, its command says
+            read = {key for key in read if not key.startswith("run.")}
         unlisted = [key for key in read if not any(covers(prefix, key) for prefix in listed)]
         assert not unlisted, f"{name} reads parameters that dvc.yaml does not list"
         unread = {
-            key.replace(method or " ", "${item.method}")
-            for key in listed
-            if not any(covers(key, read_key) for read_key in read)
+            place
+            for place in stages()[step].get("params", [])
+            if not any(covers(_filled(place, marks), read_key) for read_key in read)
         }
-        unread -= {"setup.clamp_direction"} if method else OF_OTHER_RECORDINGS  # without mounting
-        if method not in ("de", "bo"):  # methods share a list: what none of them reads is idle
-            idle_keys[step] = idle_keys.get(step, unread) & unread
+        # Pairs share a list: what none of them reads is idle. Some is of other recordings, of a
+        # band without clamps, of another optimiser.
+        unread -= {"setup.urdf", "setup.clamp_direction", "optimizer.mutation"}
+        unread -= {"optimizer.recombination"}
+        idle_keys[step] = idle_keys.get(step, unread) & unread
         everything_read.update(read)
     assert not any(idle_keys.values()), f"dvc.yaml lists what no method reads: {idle_keys}"
     content = YAML(typ="safe").load(project.folder / "params.yaml")
     keys = {f"{section}.{key}" for section, value in content.items() for key in value}
-    keys -= {f"methods.{name}" for name in content["methods"]} - {
-        "methods.sling2sim2real",
-        "methods.least_squares",
-    }
-    keys -= {
-        f"run.{key}" for key in ("rig", "own", "dips", "steps", "own_steps", "ablations")
-    }  # dvc.yaml's
+    ours = {f"methods.{name}" for name in METHODS}
+    keys -= {f"methods.{name}" for name in content["methods"]} - ours
+    keys -= {key for key in keys if key.startswith("run.")}  # dvc.yaml's
     keys -= {key for key in keys if key.startswith("plan.")}  # read by `sling plan`, and the rig
     keys -= {f"bands.{name}" for name in content["bands"]} - {"bands.band1"}  # those that run
     # read for other recordings, or with another mask: tests/recording shows what they do
-    keys -= {*OF_OTHER_RECORDINGS}
+    keys -= {"setup.urdf"}
     idle = {key for key in keys if not any(covers(key, read) for read in everything_read)}
     assert not idle, "parameters that do nothing"
 
@@ -225,9 +225,9 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
         "--force",
         "--no-run-cache",
         "--downstream",
-        "history@band1-sling2sim2real",  # of one phase: tests/identification
+        "history@band1-paper",  # of one phase: tests/identification/search/test_loop.py
     )
-    assert ran == {*of_method(PAPER), "report"}
+    assert ran == {*of_pair("band1", PAPER), "report"}
     assert (project.folder / "dvc.lock").read_text() == before
     for file, content in reports.items():
         assert file.read_bytes() == content, file
@@ -237,8 +237,8 @@ def test_a_run_that_is_killed_goes_on_to_the_same_results(project: Copy) -> None
     """All its processes at once, as by a power cut, within three of its stages."""
     lock, yaml = project.folder / "dvc.lock", YAML()
     content = yaml.load(lock)
-    before = {name: content["stages"].pop(name) for name in OWN_CHAIN}
-    card = project.folder / "reports/bands" / OWN
+    before = {name: content["stages"].pop(name) for name in OF_MINE}
+    card = project.folder / "reports/bands" / MINE
     files = contents(card)
     yaml.dump(content, lock)
     shutil.rmtree(project.folder / ".dvc/cache/runs")
@@ -247,17 +247,17 @@ def test_a_run_that_is_killed_goes_on_to_the_same_results(project: Copy) -> None
             path = project.folder / out["path"]
             shutil.rmtree(path) if path.is_dir() else path.unlink()
     run = MarkedRun(project.folder, **project.environment)
-    for stage in ("density", "policy", "card"):
-        dvc = run.start("dvc", "repro", f"own_card@{OWN}")
+    for stage in ("posterior", "policy", "card"):
+        dvc = run.start("dvc", "repro", f"card@{MINE}")
         until(lambda: run.named(f"stages.{stage}") or dvc.poll() is not None)  # noqa: B023
         time.sleep(0.5)  # it is at work
         assert dvc.poll() is None, run.message
         os.killpg(dvc.pid, signal.SIGKILL)
         dvc.wait()
         assert run.left() == []
-    assert f"own_card@{OWN}" in project.dvc("repro", f"own_card@{OWN}")
+    assert f"card@{MINE}" in project.dvc("repro", f"card@{MINE}")
     stages = yaml.load(lock)["stages"]
-    assert {name: stages[name] for name in OWN_CHAIN} == before
+    assert {name: stages[name] for name in OF_MINE} == before
     assert contents(card) == files
     assert not [*project.folder.glob("data/**/*.tmp"), *project.folder.glob("reports/**/*.tmp")]
 
@@ -297,80 +297,73 @@ class Change(NamedTuple):
 
 
 def after_clusters(edit: dict[str, object]) -> Change:
-    clusters = of_method(PAPER, "clusters") - of_method(PAPER, "cma")
-    return Change(edit, {*clusters, "report"}, of_method(PAPER, "cma"))
+    return Change(edit, {*of("band1-paper", "clusters"), "report"}, of_pair("band1", PAPER, "cma"))
 
 
-CARDS = {*of_band("card"), *of_band("card", band=OWN)}
-EVIDENCE = {*of_band("evidence"), *of_band("evidence", band=OWN)}
+CARDS = {*of("band1", "card"), *of(MINE, "card")}
 SHOWN = {*CARDS, "report"}
-LAUNCHED = {  # from where launches are planned on
-    *(stage for method in SEARCH for stage in of_method(method, "policy")),
-    *of_method(OURS, "policy", OWN),
-}
-ON_THE_RIG = {stage for stage in LAUNCHED if "launches" in stage}
+LAUNCHED = {*(s for m in METHODS for s in of_pair("band1", m, "policy")), *both("policy")}
 TRIALS = {stage for stage in LAUNCHED if "trials" in stage}
-BY_EVIDENCE = {stage for band in ("band1", OWN) for stage in of_method(OURS, "density", band)}
+POSTERIORS = {f"posterior@{name}-{OURS}" for name in ("band1", MINE)}
 CHANGES = {
     "optimizer.k_top": after_clusters({"optimizer.k_top": 1}),
     "optimizer.k_nn": after_clusters({"optimizer.k_nn": 7}),
     "optimizer.delta": after_clusters({"optimizer.delta": 0.11}),
     "optimizer.cma_population": Change(
         {"optimizer.cma_population": 5},
-        {"cma@band1-sling2sim2real", "report"},
-        of_method(PAPER, "theta"),
+        {"cma@band1-paper", "report"},
+        of_pair("band1", PAPER, "theta"),
     ),
     "optimizer.cma_rollouts": Change(
         {"optimizer.cma_rollouts": 10},
-        {"cma@band1-sling2sim2real", "ablation_bo@band1-bo", "report"},
-        {*of_method(PAPER, "theta"), *of_method("bo", "theta")},
+        {"cma@band1-paper", "search@band1-bo", "report"},
+        {*of_pair("band1", PAPER, "theta"), *of_pair("band1", BO, "theta")},
     ),
     "optimizer.generations": Change(
         {"optimizer.generations": 3},
         {
-            *(f"history@band1-{method}" for method in METHODS),
-            f"own_history@{OWN}-{OURS}",
-            "ablation_bo@band1-bo",
+            *(f"history@band1-{method}" for method in (OURS, PAPER)),
+            f"history@{MINE}-{OURS}",
+            "search@band1-bo",
             "report",
         },
         {
-            *of_method(OURS, "density"),
-            *of_method(OURS, "density", OWN),
-            *of_method(PAPER, "clusters"),
-            *of_method("bo", "theta"),
+            *both("posterior"),
+            *of_pair("band1", PAPER, "clusters"),
+            *of_pair("band1", BO, "theta"),
             *CARDS,
         },
     ),
     "setup.projectile_mass": Change(
         {"setup.projectile_mass": 0.040},
-        {*EVIDENCE, *LAUNCHED, *of_band("floor"), *SHOWN},
-        BY_EVIDENCE - LAUNCHED,
+        {*POSTERIORS, *LAUNCHED, *of("band1", "floor"), *SHOWN},
+        both("theta") - LAUNCHED,
     ),
     "setup.arm_stiffness": Change(
         {"setup.arm_stiffness": 11000.0},
-        {*EVIDENCE, *(LAUNCHED - ON_THE_RIG), *SHOWN},
-        (BY_EVIDENCE - LAUNCHED) | ON_THE_RIG,
+        {*POSTERIORS, *LAUNCHED, *SHOWN},
+        both("theta") - LAUNCHED,
     ),
-    "evidence of band1": Change(
-        ("data/evidence/band1.csv", LAUNCH.splitlines()[1].replace("2.0", "2.01") + "\n"),
-        EVIDENCE,
-        {*BY_EVIDENCE, *TRIALS, *SHOWN},
+    "a launch of band1": Change(
+        ("data/launches/band1.csv", LAUNCH.replace("2.0", "2.01")),
+        {f"posterior@band1-{OURS}", *(t for t in TRIALS if "band1" in t), "report"},
+        {*of_pair("band1", OURS, "theta"), *of("band1", "card")} - TRIALS,
     ),
-    "measured landings of a band": Change(
-        (f"data/trials/measured/{OWN}.csv", LAUNCH),
-        {*EVIDENCE, "report"},
-        {*BY_EVIDENCE, *TRIALS, *CARDS},
-    ),
-    "a size of a band": Change({f"bands.{OWN}.mass": 0.024}, {*(OWN_CHAIN - EVIDENCE), "report"}),
+    "a size of a band": Change({f"bands.{MINE}.mass": 0.024}, {*OF_MINE, "report"}),
     "rig.bands.band1": Change(
         {"rig.bands.band1.viscosity": 0.0013},
-        {*of_band("record", "floor"), *ON_THE_RIG},
-        EVERYTHING - OWN_CHAIN - EVIDENCE - of_band("record", "floor") - ON_THE_RIG,
+        {*of("band1", "record", "floor"), *TRIALS},
+        EVERYTHING - OF_MINE - of("band1", "record", "floor") - TRIALS | of(MINE, "card"),
+    ),
+    "plan.dips": Change(
+        {"plan.dips": [{"at": 0.9, "depth": 0.2, "out_time": 1.0, "back_time": 1.0}]},
+        of("band1", "record"),
+        EVERYTHING - OF_MINE - of("band1", "record", "floor"),
     ),
     "the Bayesian optimiser": Change(
-        ("sling2sim2real/identification/searches/bayesian.py", "# edited\n"),
-        {"ablation_bo@band1-bo"},
-        {*of_method("bo", "theta"), "report"},
+        ("sling2sim2real/identification/searches/bo.py", "# edited\n"),
+        {"search@band1-bo"},
+        {*of_pair("band1", BO, "theta"), "report"},
     ),
     "a chapter of the report": Change(
         ("pipeline/report/chapters/appendix.py", "# edited\n"), {"report"}
@@ -406,24 +399,14 @@ def test_a_change_makes_stale_what_depends_on_it(
     assert project.after(at_once) - at_once == change.then
 
 
-def test_a_band_of_ones_own_has_a_chain_by_the_first_method(project: Copy) -> None:
-    card = f"own_card@{OWN}"
-    assert {card, *networkx.ancestors(project.graph, card)} == OWN_CHAIN
+def test_a_card_needs_the_chain_of_the_main_method_alone(project: Copy) -> None:
+    card = f"card@{MINE}"
+    assert {card, *networkx.ancestors(project.graph, card)} == OF_MINE
 
 
-def test_launches_of_one_band_run_nothing_of_another(project: Copy) -> None:
-    """The stage that reads them runs for every band, and writes the same for the others."""
-    for name in ("evidence of band1", "measured landings of a band"):
-        CHANGES[name].make(project)
-    assert project.dvc("repro", "--no-run-cache", *EVIDENCE) == EVIDENCE
-    others = {f"density@band1-{OURS}", f"own_trials@{OWN}-{OURS}", "report"}
-    assert project.status().keys() == others
-    # What a lab launches with is of evidence alone.
-    files = [project.folder / f"data/launches/{band}/observed.json" for band in ("band1", OWN)]
-    before = [file.read_bytes() for file in files]
-    for name in ("setup.projectile_mass", "setup.arm_stiffness"):
-        CHANGES[name].make(project)
-    for band in ("band1", OWN):
-        project("sh", "stages/run.sh", "evidence", band)
-    same = [file.read_bytes() == content for file, content in zip(files, before, strict=True)]
-    assert same == [False, True]
+def test_launches_to_check_teach_the_posterior_nothing(project: Copy) -> None:
+    """Its stage reads them and writes the same, so that what follows of θ does not run."""
+    with (project.folder / f"data/launches/{MINE}.csv").open("a", encoding="utf-8") as file:
+        file.write("-0.3,-0.17,,2.0,check\n")
+    again = {f"posterior@{MINE}-{OURS}", f"trials@{MINE}-{OURS}", f"card@{MINE}"}
+    assert project.dvc("repro", f"card@{MINE}") == again

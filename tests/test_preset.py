@@ -9,6 +9,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from dvc.utils.hydra import apply_overrides
 from ruamel.yaml import YAML
 
 from sling2sim2real.base.errors import UserError
@@ -36,12 +37,18 @@ def test_a_presets_keys_are_all_that_changes(name: str, tmp_path: Path) -> None:
     write_preset(path, preset(name))
     load(path)  # is valid
     after = path.read_text(encoding="utf-8")
-    old, new = (leaves(YAML(typ="safe").load(text)) for text in (before, after))
-    changed = leaves(preset(name))
-    assert set(changed) <= set(old)  # each key stands in params.yaml, so that one sees it change
-    assert new == old | changed and all(old[key] != value for key, value in changed.items())
-    assert notes(before) == notes(after)
+    old, new = (YAML(typ="safe").load(text) for text in (before, after))
+    asked = YAML(typ="safe").load(PRESETS / f"{name}.yaml")
+    assert new.pop("run") == asked.pop("run", old["run"])  # replaced, as a whole
+    del old["run"]
+    old, new, asked = leaves(old), leaves(new), leaves(asked)
+    assert set(asked) <= set(old)  # each key stands in params.yaml, so that one sees it change
+    assert new == old | asked and all(old[key] != value for key, value in asked.items())
+    rest = [text[text.index("\nbands:") :] for text in (before, after)]
+    assert notes(rest[0]) == notes(rest[1])
     write_preset(path, preset(name))  # again, as after a kill
+    assert path.read_text(encoding="utf-8") == after
+    apply_overrides(path, ["optimizer.seed=1"])  # as `dvc exp run -S` does
     assert path.read_text(encoding="utf-8") == after
 
 
@@ -50,12 +57,12 @@ def test_the_papers_preset_has_no_method_of_ours_and_searches_the_whole_box(tmp_
     path.write_text(DEFAULTS.read_text(encoding="utf-8"), encoding="utf-8")
     write_preset(path, preset("paper"))
     params = load(path)
-    run = [params.methods[name] for name in (*params.run.methods, *params.run.ablations.methods)]
-    assert not any(method.mounting for method in run)
+    run = [params.methods[pair.method] for pair in params.run.pairs.values()]
+    assert len(run) == 16 and not any(method.mounting for method in run)
     assert {method.law for method in run} == {"neo_hookean"} and not any(
         method.bounds for method in run
     )
-    assert not params.methods["sling2sim2real"].fixed
+    assert not params.methods["paper"].fixed
 
 
 def test_what_is_no_preset_or_spoils_params_is_refused_and_nothing_changes(tmp_path: Path) -> None:

@@ -5,7 +5,8 @@
 OLD and NEW are folders of the project, each with its data/ and reports/ after `make run` on the
 same machine. Values count as the same to the last digit. Files, keys, columns, tables and rows that
 one run alone has are listed, but are no difference: a change may remove or add them. `--rename`
-says which path in NEW holds what OLD has elsewhere, as a regular expression. Exit status 1 where a
+says, as a regular expression, what NEW calls otherwise than OLD: in paths, and in texts that are
+values. Exit status 1 where a
 value differs, 2 where there is nothing to compare.
 """
 
@@ -34,10 +35,17 @@ IGNORED_COLUMNS = {"seconds"}
 class Comparison:
     """What was found: `differences` count, `only` is what one run alone has."""
 
+    renames: list[tuple[str, str]] = field(default_factory=list)
     values: int = 0
     files: int = 0
     differences: list[str] = field(default_factory=list)
     only: list[str] = field(default_factory=list)
+
+    def renamed(self, text: str) -> str:
+        """What NEW calls what OLD calls `text`."""
+        for pattern, replacement in self.renames:
+            text = re.sub(pattern, replacement, text)
+        return text
 
     def compare(self, where: str, old: Any, new: Any) -> None:
         """Walk through two values of the same place."""
@@ -53,6 +61,7 @@ class Comparison:
                 self.compare(f"{where}[{index}]", first, second)
         else:
             self.values += 1
+            old = self.renamed(old) if isinstance(old, str) else old
             if old != new and not (_is_nan(old) and _is_nan(new)):
                 self.differences.append(f"{where}: {_short(old)} -> {_short(new)}")
 
@@ -129,13 +138,11 @@ def results(root: Path) -> Iterator[str]:
 
 
 def compare_runs(old: Path, new: Path, renames: list[tuple[str, str]]) -> Comparison:
-    """Compare all results of two project folders; `renames` turn a path of OLD into that of NEW."""
-    comparison = Comparison()
+    """Compare all results of two project folders; `renames` turn names of OLD into those of NEW."""
+    comparison = Comparison(renames)
     seen = set()
     for place in results(old):
-        renamed = place
-        for pattern, replacement in renames:
-            renamed = re.sub(pattern, replacement, renamed)
+        renamed = comparison.renamed(place)
         seen.add(renamed)
         if not (new / renamed).is_file():
             comparison.only.append(f"{place} (OLD only)")

@@ -33,7 +33,7 @@ from sling2sim2real.identification.results.theta import load_theta  # noqa: E402
 from sling2sim2real.settings import load  # noqa: E402
 
 PAGE = ROOT / "docs" / "hero.webp"
-OURS, PAPER = "least_squares", "sling2sim2real"
+OURS, PAPER = "posterior", "paper"
 PULL_STEP, PULL_SHOWN = 0.24, 80  # s between frames of the pull, and ms for each
 BEFORE, AFTER = -0.02, 0.05  # of the release [s]
 DRAWN, FLIGHT_SHOWN, HOLD = 900, 50, 2500  # ms before a flight, for each of its points, and after

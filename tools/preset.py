@@ -2,8 +2,8 @@
 
     python tools/preset.py large    # as `make large`; further arguments go to `sling flow`
 
-The preset's keys are written into params.yaml, for `git diff` to show and `sling reset` to take
-back (`git checkout reports dvc.lock` for its results); then `sling flow`. Its report is copied to
+The preset's keys are written into params.yaml, for `git diff` to show and `git checkout` to take
+back (of reports and dvc.lock too, for its results); then `sling flow`. Its report is copied to
 reports/presets/, and `seconds` in reports/run.js is how long it took. Killed, it goes on where it
 was when it is called again, whose time is then that of the rest.
 """
@@ -20,7 +20,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from ruamel.yaml import YAML
+from dvc.utils.serialize import dumps_yaml, parse_yaml_for_update
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
@@ -29,7 +29,6 @@ from pipeline.report.run import write_run  # noqa: E402
 from sling2sim2real.base import errors  # noqa: E402
 from sling2sim2real.base.errors import UserError  # noqa: E402
 from sling2sim2real.base.files import replacing_folder, write_text  # noqa: E402
-from sling2sim2real.cli.params_file import edited  # noqa: E402
 from sling2sim2real.settings import parse  # noqa: E402
 
 PRESETS = ROOT / "presets"
@@ -45,22 +44,25 @@ def preset(name: str) -> dict:
     if not path.is_file():
         presets = ", ".join(sorted(preset_file.stem for preset_file in PRESETS.glob("*.yaml")))
         raise UserError(f"{name}: no such preset; there are {presets}")
-    return YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    return parse_yaml_for_update(path.read_text(encoding="utf-8"), str(path))
 
 
 def write_preset(path: Path, changes: dict) -> None:
-    """Write a preset's keys into params.yaml, whose comments stay. Raises UserError."""
-    text = edited(path.read_text(encoding="utf-8"), lambda content: _merge(content, changes))
+    """Write a preset's keys into params.yaml, in DVC's form; comments stay. Raises UserError.
+
+    Its `run` replaces that of params.yaml: another run has other entries.
+    """
+    content = parse_yaml_for_update(path.read_text(encoding="utf-8"), str(path))
+    _merge(content, changes)
+    text = dumps_yaml(content)
     parse(text, str(path))
     write_text(path, text)
 
 
 def _merge(content: dict, changes: dict) -> None:
     for key, value in changes.items():
-        if isinstance(value, dict) and isinstance(content.get(key), dict):
+        if key != "run" and isinstance(value, dict):
             _merge(content[key], value)
-        elif isinstance(value, list) and isinstance(content.get(key), list):
-            content[key][:] = value  # it stays on its line
         else:
             content[key] = value
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import re
 import shutil
@@ -19,7 +20,7 @@ from ruamel.yaml import YAML
 
 from sling2sim2real.base.code import ROOT
 from sling2sim2real.settings import Params, load
-from sling2sim2real.settings.identification import methods_by_step
+from sling2sim2real.settings.run import PLAIN, UNIONS
 
 DEFAULTS = ROOT / "params.yaml"
 CLI = (
@@ -106,22 +107,37 @@ def _set(content: dict, values: Mapping[str, object]) -> None:
         node[name] = value
 
 
-def run_of(
-    bands: Sequence[str], methods: Sequence[str], ablations: Sequence[str] = ()
-) -> dict[str, object]:
-    """Keys of `run`: bands of the rig, methods, and further methods on the first band."""
-    default_methods = load(DEFAULTS).methods
-    first = [*bands[:1]] if ablations else []
-    further = {"bands": first, "rig": first, "methods": [*ablations]}
-    return {
-        "run.bands": [*bands],
-        "run.rig": [*bands],
-        "run.methods": [*methods],
-        "run.steps": methods_by_step(methods, default_methods),
-        "run.dips": [],
-        "run.own_steps": methods_by_step(methods[:1], default_methods),
-        "run.ablations": further | {"steps": methods_by_step(ablations, default_methods)},
+def run_of(methods: Mapping[str, Sequence[str]], rig: bool = True) -> dict[str, dict]:
+    """The section `run` of params.yaml.
+
+    Args:
+        methods: By recordings, each called BAND or BAND-RECORDING; the first is `run.main`.
+        rig: Whether the virtual rig makes the recordings.
+    """
+    named = {name: method.search for name, method in load(DEFAULTS).methods.items()}
+    recordings = {}
+    for key in methods:
+        band, _, recording = key.partition("-")
+        recordings[key] = {"band": band, "recording": recording or PLAIN}
+    kinds: dict[str, dict] = {kind: {} for kind in UNIONS["pairs"]}
+    for key, names in methods.items():
+        for name in names:
+            search = named[name]
+            kind = search if search in kinds else "search"
+            code = {"search": search} if kind == "search" else {}
+            kinds[kind][f"{key}-{name}"] = recordings[key] | {"method": name} | code
+    unions = {
+        union: {key: pair for kind in members for key, pair in kinds[kind].items()}
+        for union, members in UNIONS.items()
     }
+    bands = list(dict.fromkeys(recording["band"] for recording in recordings.values()))
+    section = {
+        "floors": bands if rig else [],
+        "main": next(iter(methods.values()))[0],
+        "rig": recordings if rig else {},
+        "recordings": recordings,
+    }
+    return {"run": copy.deepcopy(section | kinds | unions)}
 
 
 def environment(**more: str) -> dict[str, str]:

@@ -8,7 +8,7 @@ elastic laws that no other rubber has, and every second one softens, half of the
 (rig/physics/rubber.py), which no other does either.
 
 The rules, written before any of these sealed rubbers was run:
-- least_squares is the default method, if over the develop rubbers (three recordings each) and the
+- posterior is the default method, if over the develop rubbers (three recordings each) and the
   rig's bands (five each) the mean over bands of |bias| is less than that of the paper's method on
   the same recordings; else the paper's. bias is the mean error without launch noise of nine
   targets, as validation/density.py scores it.
@@ -88,8 +88,6 @@ def _rubber(kind: str, law: str, rng: np.random.Generator) -> tuple[dict, dict]:
     mass = near(np.pi / 4 * diameter**2 * 0.52 * 750, 0.3)
     constants, share = (LAWS | UNSEEN_LAWS)[law]
     rig_params = {
-        "like": None,
-        "pull": None,
         "peak_force": between(10.0, 17.0),
         "relaxation": [],
         "viscosity": between(0.0005, 0.0025, log=True),
@@ -131,11 +129,11 @@ def with_rubbers(
     """params.yaml with these bands besides, and the rig's seed of one of their recordings.
 
     Args:
-        pull: By which they are recorded (`rig.pull`).
+        pull: By which they are recorded (`rig.recordings.plain.pull`).
         worn: They were drawn as far before (`bands.<name>.preconditioned`).
     """
     drawn = rubbers(seed)
-    values: dict[str, object] = {"rig.seed": 100 + recording, "rig.pull": pull}
+    values: dict[str, object] = {"rig.seed": 100 + recording, "rig.recordings.plain.pull": pull}
     for name, (band, rubber) in drawn.items():
         values |= {f"bands.{name}": band, f"rig.bands.{name}": rubber}
     if worn:

@@ -11,9 +11,9 @@ import numpy as np
 
 from sling2sim2real.identification.objective.box import latin_hypercube
 from sling2sim2real.identification.search import Evaluate
-from sling2sim2real.identification.searches.bayesian import bayesian
+from sling2sim2real.identification.searches.bo import bayesian
 from sling2sim2real.identification.searches.cma_es import cma_es
-from sling2sim2real.identification.searches.differential_evolution import differential_evolution
+from sling2sim2real.identification.searches.de import differential_evolution
 from sling2sim2real.identification.searches.regions import Region, suppress
 
 

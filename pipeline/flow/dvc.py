@@ -86,14 +86,9 @@ def graph_of(root: Path) -> networkx.DiGraph:
 
 
 def named(target: str, stages: Iterable[str]) -> set[str]:
-    """The stages that a target means: one, or all of a step. Raises UserError.
-
-    A group's prefix may be left out: `theta@band1-de` finds `ablation_theta@band1-de`.
-    """
-    for prefix in ("", ".+_"):
-        shape = f"{prefix}{re.escape(target)}(@.+)?"
-        if found := {name for name in stages if re.fullmatch(shape, name)}:
-            return found
+    """The stages that a target means: one, or all of a step. Raises UserError."""
+    if found := {name for name in stages if target in (name, name.partition("@")[0])}:
+        return found
     raise UserError(f"{target}: no stage of dvc.yaml; `dvc stage list` has all")
 
 

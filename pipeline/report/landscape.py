@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -33,10 +34,10 @@ class Landscape:
     loss: np.ndarray
 
 
-def landscape(params: Params, result: Result, episode: Episode) -> Landscape:
+def landscape(params: Params, result: Result, episode: Episode, clamps: Path) -> Landscape:
     """Around the regions of a search and where CMA-ES went from them."""
     box = SearchBox.of_method(params, result.method)
-    sling = calibrated(params, result.band, result.theta)
+    sling = calibrated(params, result.band, result.theta, clamps)
     best = box.unit_of(parameters_of(result.theta))[0]
     x, y = (_span(result, name) for name in AXES)
     grid = np.tile(best, (SIZE * SIZE, 1))

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sling2sim2real.base.layout import Layout, NotMade
+from pipeline.layout import Layout
+from sling2sim2real.base.layout import NotMade
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.identification.results.theta import calibrated, parameters_of
 from sling2sim2real.settings import Params
+from sling2sim2real.settings.run import Pair
 from sling2sim2real.simulator.replay import replay
 
 
@@ -28,16 +30,16 @@ class MethodReplay:
 
 
 def replay_method(
-    params: Params, band: str, method: str, episode: Episode, theta: dict
+    params: Params, pair: Pair, episode: Episode, theta: dict, layout: Layout
 ) -> MethodReplay:
     """Simulate the episode's pull with a θ file's content.
 
     Raises:
         NotMade: θ fails in simulation.
     """
-    sling = calibrated(params, band, theta)
-    loss = EpisodeLoss.of(params, method, episode, sling)
+    sling = calibrated(params, pair.band, theta, layout.clamps(pair))
+    loss = EpisodeLoss.of(params, pair.method, episode, sling)
     done = replay(sling, episode, parameters_of(theta), params.force)
     if failure := done.rollouts.failure[0]:
-        raise NotMade(Layout().theta(band, method), failure)
+        raise NotMade(layout.theta(pair), failure)
     return MethodReplay(done.force[0], loss.frames(done.rollouts)[0])

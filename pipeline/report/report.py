@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.layout import Layout
 from pipeline.report.landscape import Landscape, landscape
 from pipeline.report.paper import METHOD
 from pipeline.report.replay import MethodReplay, replay_method
@@ -39,12 +40,15 @@ class Report:
     def of(cls, params: Params, root: Path) -> Report:
         """Report on everything in params.run. Raises UserError where an input is missing."""
         results = gather(params, root)
+        layout = Layout(root)
         named = styles(dict.fromkeys(result.method for result in results))
-        replays = {band: _replays(params, results, band) for band in params.run.bands}
+        replays = {band: _replays(params, results, band, layout) for band in results.methods}
         searched = next((result for result in results if result.regions), None)
         chart = searched and (
             searched,
-            landscape(params, searched, results.episodes[searched.band]),
+            landscape(
+                params, searched, results.episodes[searched.band], layout.clamps(searched.pair)
+            ),
         )
         return cls(params, results, replays, named, chart, root)
 
@@ -55,12 +59,12 @@ class Report:
     @property
     def main(self) -> str:
         """The method that the report is about first: that of the cards."""
-        return self.params.run.methods[0]
+        return self.params.run.main
 
     @property
     def references(self) -> tuple[str, ...]:
         """What others are compared with: the main method, and the paper's where it ran too."""
-        theirs = (METHOD,) if METHOD in self.params.run.methods else ()
+        theirs = (METHOD,) if METHOD in self.results.shared else ()
         return tuple(dict.fromkeys((self.main, *theirs)))
 
     def shown(self, methods) -> Styles:
@@ -76,15 +80,16 @@ class Report:
 
     def draws(self, result: Result, targets: np.ndarray) -> np.ndarray:
         """The policy's draws (N, 2) [m] for targets (N,) [m]."""
-        return Stored(result.band, result.method, self.root).draws(targets)
+        return Stored(Layout(self.root).policy(result.pair)).draws(targets)
 
 
-def _replays(params: Params, results: Results, band: str) -> dict[str, MethodReplay]:
+def _replays(
+    params: Params, results: Results, band: str, layout: Layout
+) -> dict[str, MethodReplay]:
     """Replays of the methods that are drawn."""
-    recorded, methods = results.episodes[band], results.methods[band]
-    some = drawn(params.run.methods)
+    episode, some = results.episodes[band], drawn(results.shared)
     return {
-        method: replay_method(params, band, method, recorded, methods[method].theta)
-        for method in methods
+        method: replay_method(params, result.pair, episode, result.theta, layout)
+        for method, result in results.methods[band].items()
         if method in some
     }

@@ -9,15 +9,17 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sling2sim2real.base.layout import Layout, NotMade, made
+from pipeline.layout import Layout
+from sling2sim2real.base.layout import NotMade, made
 from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.theta import load_theta
 from sling2sim2real.identification.searches.regions import Region, load_regions
+from sling2sim2real.launching.launches_file import CHECK, read_launches
 from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.launching.surface.stored import Stored
-from sling2sim2real.launching.trials.measured import load_scores
 from sling2sim2real.settings import Params
+from sling2sim2real.settings.run import Pair
 
 PRINTED = ("geom", "force", "work")  # the paper's loss is their sum (docs/method.md)
 
@@ -35,7 +37,7 @@ class Floor(FloorOfTarget):
 
 @dataclass(frozen=True)
 class Result:
-    """What one method made of one band.
+    """What one method made of one recording.
 
     Attributes:
         theta: The θ file: "theta", "loss", "rollouts", "confidence", ...
@@ -48,8 +50,7 @@ class Result:
         trials: One row a launch (sling2sim2real/launching/trials/trials.py).
     """
 
-    band: str
-    method: str
+    pair: Pair
     theta: dict
     evaluations: pd.DataFrame
     regions: list[Region]
@@ -60,37 +61,52 @@ class Result:
     trials: pd.DataFrame
 
     @property
+    def band(self) -> str:
+        return self.pair.band
+
+    @property
+    def method(self) -> str:
+        return self.pair.method
+
+    @property
     def confidence(self) -> dict:
         """Intervals of the θ file by kind; empty where it has none."""
         return self.theta.get("confidence") or {}
 
 
 @dataclass(frozen=True)
-class InformativePull:
-    """Another recording of a band of the rig, by the informative pull (`run.dips`).
+class Another:
+    """A further recording of a band, by the main method.
 
     Attributes:
-        band: The one of `run.bands` whose name its own begins with, or itself.
-        trials: As of a `Result`, by the first method.
+        trials: As of a `Result`.
     """
 
     band: str
+    recording: str
     trials: pd.DataFrame
 
 
 @dataclass(frozen=True)
 class Results:
-    """All that ran: `episodes` by band, `methods` by band and then method, in the order of run.
+    """All that ran: `episodes` by band, `methods` by band and then method, in params.yaml's order.
 
-    `floors` is the actuation floor of each band that the rig launches (rig/oracle/floor.py);
-    `unused` counts a band's measured launches of methods that do not run on it, where there are.
+    They are of each band's first recording; `others` are the further ones, by their names. `floors`
+    is the actuation floor of each band of the rig (rig/oracle/floor.py); `unused` counts a band's
+    launches to check methods that do not run on it, where there are.
     """
 
     episodes: dict[str, Episode]
     methods: dict[str, dict[str, Result]]
     floors: dict[str, dict]
     unused: dict[str, int] = field(default_factory=dict)
-    dips: dict[str, InformativePull] = field(default_factory=dict)
+    others: dict[str, Another] = field(default_factory=dict)
+
+    @property
+    def shared(self) -> list[str]:
+        """Methods that run on every band."""
+        methods = dict.fromkeys(result.method for result in self)
+        return [m for m in methods if all(m in of_band for of_band in self.methods.values())]
 
     @property
     def least(self) -> dict[str, float]:
@@ -110,50 +126,55 @@ class Results:
 
 def gather(params: Params, root: str | Path = ".") -> Results:
     """Read the outputs of every band and method of params.run. Raises UserError."""
-    layout = Layout(Path(root))
-    episodes = {band: Episode.load(layout.episode(band)) for band in params.run.bands}
-    methods = {}
-    for band in params.run.bands:
-        ablations = params.run.ablations.methods if band in params.run.ablations.bands else ()
-        ran = dict.fromkeys([*params.run.methods, *ablations])
-        methods[band] = {method: _result(params, layout, band, method) for method in ran}
-    floors = {band: load_floor(layout.floor(band)) for band in params.run.rig}
-    unused = {band: _unused(layout, band, methods[band]) for band in methods}
-    dips = {
-        name: InformativePull(
-            next((listed for listed in params.run.bands if name.startswith(f"{listed}_")), name),
-            pd.read_parquet(made(layout.trials(name, params.run.methods[0]))),
-        )
-        for name in params.run.dips
+    layout, run = Layout(Path(root)), params.run
+    episodes = {band: Episode.load(layout.episode(first)) for band, first in run.first.items()}
+    methods = {
+        band: {
+            method: _result(params, layout, run.pairs[key])
+            for method in params.methods
+            if (key := f"{first.key}-{method}") in run.pairs
+        }
+        for band, first in run.first.items()
     }
-    return Results(episodes, methods, floors, {band: n for band, n in unused.items() if n}, dips)
+    floors = {band: load_floor(layout.floor(band)) for band in run.floors if band in methods}
+    unused = {band: _unused(layout, band, methods[band]) for band in methods}
+    others = {
+        key: Another(
+            recording.band,
+            recording.recording,
+            pd.read_parquet(made(layout.trials(run.pairs[f"{key}-{run.main}"]))),
+        )
+        for key, recording in run.recordings.items()
+        if recording not in run.first.values()
+    }
+    return Results(episodes, methods, floors, {band: n for band, n in unused.items() if n}, others)
 
 
 def _unused(layout: Layout, band: str, methods: Collection[str]) -> int:
-    """How many measured launches name a method that does not run on the band."""
-    return sum(score.method not in ("", *methods) for score in load_scores(layout.scores(band)))
+    """How many launches check a method that does not run on the band."""
+    launches = read_launches(layout.launches(band))
+    return sum(launch.use == CHECK and launch.method not in ("", *methods) for launch in launches)
 
 
-def _result(params: Params, layout: Layout, band: str, method: str) -> Result:
-    evaluations = pd.read_parquet(made(layout.evaluations(band, method)))
-    clusters = layout.clusters(band, method)
-    clustered = params.methods[method].search == "multistart"
+def _result(params: Params, layout: Layout, pair: Pair) -> Result:
+    evaluations = pd.read_parquet(made(layout.evaluations(pair)))
+    clusters = layout.clusters(pair)
+    clustered = params.methods[pair.method].search == "multistart"
     regions, axes = load_regions(clusters) if clustered else ([], [])
     if missing := [name for name in axes if f"unit_{name}" not in evaluations]:
         raise NotMade(clusters, f"names: {missing[0]} was not searched")
-    theta = load_theta(layout.theta(band, method), band)
-    stored, policy = Stored(band, method, layout.root), layout.policy(band, method)
+    theta = load_theta(layout.theta(pair), pair.band)
+    policy = layout.policy(pair)
     return Result(
-        band=band,
-        method=method,
+        pair=pair,
         theta=theta,
         evaluations=evaluations,
         regions=regions,
         axes=axes,
-        card=stored.card(),
+        card=Stored(policy).card(),
         training=pd.read_parquet(made(policy / "training.parquet")),
         landing_map=LandingMap.load(made(policy / "map.parquet")),
-        trials=pd.read_parquet(made(layout.trials(band, method))),
+        trials=pd.read_parquet(made(layout.trials(pair))),
     )
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.draw import sampled
 from rig.physics.compiled import compiled
+from rig.physics.draw import sampled
 from rig.physics.integration import integrated
 from rig.physics.scene import ROD
 from rig.physics.string import GRAVITY, ElasticString

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
-from rig.draw import sampled
+from rig.physics.draw import sampled
 from rig.physics.motion import HandMotion
 from rig.physics.robot import SENSOR_LEVER, Robot
 from rig.physics.scene import arm, joined, room, tube
@@ -23,6 +23,7 @@ from rig.recorder.interaction import Interaction, hang, pull_and_release
 from rig.recorder.mcap_writer import BagWriter
 from rig.recorder.sensors import wrench
 from sling2sim2real.base.files import replacing
+from sling2sim2real.settings.run import PLAIN
 
 if TYPE_CHECKING:
     from sling2sim2real.settings import Params
@@ -45,16 +46,20 @@ def record(
     path: Path,
     progress: Callable[[str], None] = lambda line: None,
     *,
+    recording: str = PLAIN,
     picture_scale: float = 1.0,
 ) -> Interaction:
     """Write the recording of one band to `path` and return what truly happened.
 
     Args:
+        recording: One of `rig.recordings`.
         picture_scale: Of the pictures' 640 x 480 pixels.
     """
-    params = sampled(params, band_name)
+    made = params.rig.recordings[recording]
+    name = f"{band_name}{made.stream}"
+    params = sampled(params, name)
     rig, setup = params.rig, params.setup
-    rng = np.random.default_rng([rig.seed, *band_name.encode()])
+    rng = np.random.default_rng([rig.seed, *name.encode()])
     motion_rng, sensor_rng, clock_rng, camera_rng = rng.spawn(4)
     robot = Robot.of(rig)
     string = string_of(params, band_name)
@@ -64,7 +69,7 @@ def record(
     middle = hanging[string.middle]
     opening = rig.pads.opening_time, rig.pads.shape
     pulls = {"paper": (), "informative": params.plan.dips}
-    dips = pulls[rig.bands[band_name].pull or rig.pull]
+    dips = pulls[made.pull]
     motion = HandMotion.through(middle, rig.tracking_error, opening, motion_rng, dips)
     times = np.arange(round(motion.end * SENSOR_RATE)) / SENSOR_RATE
     phase = camera_rng.random()  # a camera's clock knows nothing of the hand's

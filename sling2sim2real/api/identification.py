@@ -40,7 +40,7 @@ from sling2sim2real.settings.provenance import changed_since
 from sling2sim2real.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from sling2sim2real.simulator.parameters import Parameters
 
-METHOD = "least_squares"
+METHOD = "posterior"
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def identify(
     start: Model | None = None,
     progress: Callable[[str], None] = lambda line: None,
 ) -> Identification:
-    """Identify a band as the method `least_squares` of a run does; half a minute a recording.
+    """Identify a band as the method `posterior` of a run does; half a minute a recording.
 
     Three steps: how the band hangs, from the first episode before it is taut; the best of a design
     over the whole box of parameters; from there the mode of one density over all episodes and

@@ -46,7 +46,7 @@ class Objective:
         model: Model,
         episodes: Sequence[Episode],
         *,
-        method: str = "sling2sim2real",
+        method: str = "paper",
         loss: Callable[[Simulation, Episode], float] | None = None,
     ) -> None:
         """Prepare the loss; several episodes count alike.

@@ -27,6 +27,10 @@ COARSE = {
 }
 
 # what a params.yaml must name; longer than any fork is wide, for functions are given their band
+RECORDING = {"band": "band", "recording": "plain"}
+PAIR = {"band-posterior": RECORDING | {"method": "posterior"}}
+NO_RUN = {"floors": [], "main": "posterior", "rig": {}, "recordings": {"band": RECORDING}}
+NO_RUN |= {"multistart": {}, "search": {}} | dict.fromkeys(("posterior", "explored", "pairs"), PAIR)
 NO_BAND = {"source": "recording", "mass": 1.0, "diameter": 0.01, "rest_length": 3.0}
 
 
@@ -97,8 +101,7 @@ def _defaults() -> dict:
     with as_file(files("sling2sim2real") / "params.yaml") as path:
         content = load(path).model_dump()
     content["bands"] = {"band": NO_BAND}
-    content["run"] |= {"bands": ["band"], "rig": [], "dips": []}
-    content["run"]["ablations"] |= {"bands": [], "rig": []}
+    content["run"] = NO_RUN
     return content
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sling2sim2real.base.layout import Layout, made
+from sling2sim2real.base.layout import made
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.theta import load_samples, load_theta, parameters_of
 from sling2sim2real.launching.surface.simulator import simulator
@@ -51,6 +51,27 @@ class Aims:
 
 
 @dataclass(frozen=True)
+class CardFiles:
+    """What a card is called, and where its inputs lie.
+
+    Attributes:
+        raw: Folder of the recording's files.
+        episodes: Folder of its episodes.
+        clamps, theta, confidence, trials: Files.
+        policy: Folder of a policy.
+    """
+
+    name: str
+    raw: Path
+    episodes: Path
+    clamps: Path
+    theta: Path
+    confidence: Path
+    policy: Path
+    trials: Path
+
+
+@dataclass(frozen=True)
 class CardInputs:
     """Inputs of the card of one band by one method.
 
@@ -67,7 +88,7 @@ class CardInputs:
     params: Params
     band: str
     method: str
-    root: Path
+    files: CardFiles
     episodes: list[Episode]
     theta: dict
     samples: Parameters | None
@@ -99,29 +120,28 @@ class CardInputs:
         return self.trials.loc[self.trials.landing_y.notna() & self.trials.predicted_y.notna()]
 
 
-def card_inputs(params: Params, band: str, method: str, root: str | Path = ".") -> CardInputs:
+def card_inputs(params: Params, band: str, method: str, files: CardFiles) -> CardInputs:
     """Read and launch. Raises UserError where an input is missing."""
-    layout, band_params = Layout(Path(root)), params.bands[band]
-    theta = load_theta(layout.theta(band, method), band)
-    path = layout.confidence(band, method)
-    samples = load_samples(path, parameters_of(theta))
-    stored = Stored(band, method, layout.root)
-    episodes = Episode.load_all(layout.episodes(band))
+    band_params = params.bands[band]
+    theta = load_theta(files.theta, band)
+    samples = load_samples(files.confidence, parameters_of(theta))
+    stored = Stored(files.policy)
+    episodes = Episode.load_all(files.episodes)
     stretch = partial(
         stretch_of, fork_width=params.setup.fork_width, rest_length=band_params.rest_length
     )
-    launcher = simulator(params, band, theta, root=root)
+    launcher = simulator(params, band, theta, files.clamps)
     target = np.array(params.trials.targets, float)
     return CardInputs(
         params=params,
         band=band,
         method=method,
-        root=layout.root,
+        files=files,
         episodes=episodes,
         theta=theta,
         samples=samples,
         policy=stored.card(),
-        trials=pd.read_parquet(made(layout.trials(band, method))),
+        trials=pd.read_parquet(made(files.trials)),
         aims=aims(launcher, target, stored.draws(target), samples, stretch, params),
         recorded_stretch=recorded_stretch(
             episodes, params.setup.fork_width, band_params.rest_length

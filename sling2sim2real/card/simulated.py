@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
-from sling2sim2real.base.layout import Layout, NotMade
+from sling2sim2real.base.layout import NotMade
+from sling2sim2real.card.inputs import CardFiles
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.posterior.likelihood import opening_time
 from sling2sim2real.identification.results.theta import calibrated, parameters_of
@@ -57,13 +58,15 @@ def smooth(place: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     return Akima1DInterpolator(place, nodes, axis=0, method="makima")(along)
 
 
-def simulate(params: Params, band: str, method: str, episode: Episode, theta: dict) -> Simulated:
+def simulate(
+    params: Params, band: str, episode: Episode, theta: dict, files: CardFiles
+) -> Simulated:
     """Play the pull with a θ file's content, its release and its camera's clock as identified.
 
     Raises:
         NotMade: θ fails in simulation.
     """
-    sling = calibrated(params, band, theta)
+    sling = calibrated(params, band, theta, files.clamps)
     derived = (theta.get("confidence") or {}).get("derived", {})
     camera = 0.0
     if "release_time" in derived:  # as the density has them (identify/posterior/likelihood.py)
@@ -86,7 +89,7 @@ def simulate(params: Params, band: str, method: str, episode: Episode, theta: di
     played = replace(episode, cloud_time=stamps, clouds=[])
     done = replay(sling, played, parameters_of(theta), params.force)
     if failure := done.rollouts.failure[0]:
-        raise NotMade(Layout().theta(band, method), failure)
+        raise NotMade(files.theta, failure)
     return Simulated(
         release=float(release),
         camera=float(camera),

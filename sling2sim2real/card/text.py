@@ -24,8 +24,9 @@ def card_text(inputs: CardInputs, concluded: Conclusion, *, linked: bool = True)
     tried = sorted(inputs.launched.kind.value_counts().items())
     return filled(
         Path(__file__).with_name("card.md.j2"),
-        band=inputs.band,
+        band=inputs.files.name,
         method=inputs.method,
+        theta_file=inputs.files.theta.as_posix(),
         title=SAID[concluded.verdict],
         reasons=concluded.reasons,
         rig=inputs.params.bands[inputs.band].source == "rig",

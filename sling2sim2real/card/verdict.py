@@ -211,7 +211,7 @@ def _identified(findings: Findings):
         yield Reason(
             False,
             "This method does not tell how sure its values are.",
-            "Put `least_squares` first under `run.methods` in params.yaml: it tells.",
+            "Let `run.main` in params.yaml be `posterior`: it tells.",
         )
     elif not findings.settled:
         yield Reason(

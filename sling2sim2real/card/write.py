@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from sling2sim2real.base.files import replacing_folder, write_json, write_text
-from sling2sim2real.base.layout import Layout
 from sling2sim2real.card import figures
 from sling2sim2real.card.animation import animate
 from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.conclusion import Conclusion
-from sling2sim2real.card.inputs import CardInputs, card_inputs
+from sling2sim2real.card.inputs import CardFiles, CardInputs, card_inputs
 from sling2sim2real.card.simulated import simulate
 from sling2sim2real.card.text import card_text
 from sling2sim2real.card.values import boxes
@@ -21,18 +20,17 @@ from sling2sim2real.drawing.page import page
 from sling2sim2real.settings import Params
 
 
-def write(params: Params, band: str, method: str, root: str | Path = ".") -> dict:
+def write(params: Params, band: str, method: str, files: CardFiles, card_folder: Path) -> dict:
     """Write a band's card; return what card.json says. Raises UserError: an input is missing."""
-    inputs = card_inputs(params, band, method, root)
+    inputs = card_inputs(params, band, method, files)
     episode, setup = inputs.episode, params.setup
-    layout = Layout(Path(root))
-    recording = layout.raw(band) / episode.metadata["input"]["file"]
+    recording = files.raw / episode.metadata["input"]["file"]
     pictures = Pictures.of(recording, episode, setup)
-    simulated = simulate(params, band, method, episode, inputs.theta)
+    simulated = simulate(params, band, episode, inputs.theta, files)
 
     concluded = Conclusion.of(inputs, simulated.force)
     card = content(inputs, concluded)
-    with replacing_folder(layout.card(band)) as folder:
+    with replacing_folder(card_folder) as folder:
         figures.camera(folder / "camera.webp", episode, simulated, pictures)
         figures.force(folder / "force.png", episode, simulated)
         figures.values(folder / "values.png", concluded.values, boxes(params, method))
@@ -41,7 +39,7 @@ def write(params: Params, band: str, method: str, root: str | Path = ".") -> dic
         write_text(folder / "README.md", card_text(inputs, concluded))
         write_json(folder / "card.json", card)
         text = card_text(inputs, concluded, linked=False)
-        write_text(folder / "index.html", page(text, folder, f"{band}: {concluded.verdict}"))
+        write_text(folder / "index.html", page(text, folder, f"{files.name}: {concluded.verdict}"))
     return card
 
 
@@ -70,7 +68,7 @@ def content(inputs: CardInputs, concluded: Conclusion) -> dict:
         "values": [asdict(value) for value in concluded.values],
         "draws": draws,
         "next": concluded.steps,
-        "theta_file": Layout().theta(inputs.band, inputs.method).as_posix(),
+        "theta_file": inputs.files.theta.as_posix(),
         "recordings": len(inputs.recordings),
         "pulls": len(inputs.episodes),
         "launches": inputs.launches,

@@ -26,7 +26,7 @@ from sling2sim2real.cli.command_line import (
 from sling2sim2real.cli.sizes import DIAMETER, REST_LENGTH, assumed
 from sling2sim2real.exporting import ENGINES
 
-DEFAULT_METHOD = "least_squares"
+DEFAULT_METHOD = "posterior"
 
 
 def main() -> None:

@@ -22,7 +22,7 @@ from sling2sim2real.identification.results.theta import load_samples, load_theta
 from sling2sim2real.launching.surface.simulator import simulator
 from sling2sim2real.launching.trials.spread import LEVEL
 from sling2sim2real.settings import Params, expect_known
-from sling2sim2real.settings.identification import LEAST_SQUARES
+from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.rubber import RUBBER
 from stages.start import stage_of
 
@@ -108,8 +108,8 @@ def _place_and_stage(
     """Where the band's files lie, and the stage of dvc.yaml that is to run. Raises UserError."""
     expect_known(params, "band", band, called="--band")
     expect_known(params, "method", method, called="--method")
-    if params.methods[method].search != LEAST_SQUARES:
-        raise UserError(f"--method {method}: takes no launches as evidence, least_squares does")
+    if params.methods[method].search != POSTERIOR:
+        raise UserError(f"--method {method}: takes no launches as evidence, posterior does")
     stage = stage_of(params, "policy", band, method) if run else None
     if run and not stage:
         raise UserError(f"{method} does not run on {band}: see `run:` in params.yaml, or --no-run")

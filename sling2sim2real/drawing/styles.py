@@ -24,8 +24,8 @@ THEME = {
 # Red is ours, teal the paper's, blue to violet its ablations, yellow to brown other optimisers,
 # green the geometry-only baselines. Names are the paper's where the methods are.
 KNOWN = {
-    "least_squares": ("ours", "#d1495b"),
-    "sling2sim2real": ("Sling2Sim2Real", "#00798c"),
+    "posterior": ("ours", "#d1495b"),
+    "paper": ("Sling2Sim2Real", "#00798c"),
     "no_covariance": ("−c", "#3a5ba0"),
     "no_multistart": ("−m", "#6f9bd8"),
     "no_covariance_no_multistart": ("−c, −m", "#8d6a9f"),
@@ -38,7 +38,7 @@ KNOWN = {
 }
 SPARE = ("#2e4057", "#8c8c8c", "#c2187b", "#00b5a0", "#5e35b1", "#9e9d24")  # of a user's methods
 # Rather than others where curves would crowd.
-DRAWN = ("least_squares", "sling2sim2real", "package_si", "real2sim2real")
+DRAWN = ("posterior", "paper", "package_si", "real2sim2real")
 FEW = 2
 
 

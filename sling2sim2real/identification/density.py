@@ -11,7 +11,7 @@ from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.identification.posterior.identify import Identified, confidence, theta_entries
 from sling2sim2real.settings import Params
-from sling2sim2real.settings.identification import LEAST_SQUARES
+from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import EXTRA
 
@@ -19,14 +19,14 @@ from sling2sim2real.simulator.parameters import EXTRA
 def evaluated_mode(
     params: Params, method: str, sling: ClampedBand, episode: Episode, density: Identified
 ) -> Evaluations:
-    """The mode's loss, one row of the phase `least_squares`."""
+    """The mode's loss, one row of the phase `posterior`."""
     mode = density.mode.sample()
     box = SearchBox.of_method(params, method)
     box = replace(box, fixed={name: mode[name] for name in EXTRA})
     evaluate = Evaluator(episode, sling, EpisodeLoss.of(params, method, episode, sling), box)
     evaluations = Evaluations(method, box.names)
     evaluations.add(
-        evaluate(box.unit_of(density.mode)), phase=LEAST_SQUARES, generation=density.fit.steps
+        evaluate(box.unit_of(density.mode)), phase=POSTERIOR, generation=density.fit.steps
     )
     return evaluations
 

@@ -18,7 +18,7 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import read_table, replacing
 from sling2sim2real.identification.objective.evaluate import Evaluation
 from sling2sim2real.identification.objective.loss import TERMS
-from sling2sim2real.settings.identification import LEAST_SQUARES
+from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.parameters import Parameters
 
 
@@ -116,7 +116,7 @@ def theta_content(evaluations: Evaluations, band: str, entries: dict) -> dict:
         evaluations: Everything that a search evaluated; a density's mode is a phase of its own.
         entries: What else the search says of θ (identify/results/confidence_file.py).
     """
-    mode = evaluations.of_phase(LEAST_SQUARES)
+    mode = evaluations.of_phase(POSTERIOR)
     chosen = mode if len(mode.total) else evaluations
     best = chosen.best_row()
     terms = {name: best[name] for name in (*TERMS, "total") if np.isfinite(best[name])}

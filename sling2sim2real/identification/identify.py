@@ -20,7 +20,7 @@ from sling2sim2real.identification.search import explore
 from sling2sim2real.identification.searches.cma_es import refine
 from sling2sim2real.identification.searches.regions import regions_of
 from sling2sim2real.settings import Params
-from sling2sim2real.settings.identification import LEAST_SQUARES
+from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
 
@@ -90,7 +90,7 @@ def search_and_fit(
         evaluations = evaluations_of(params, method, evaluate)
         progress(f"explored {len(evaluations.total)} points")
         start = evaluations.best_parameters(params.methods[method].law)
-    if params.methods[method].search != LEAST_SQUARES:
+    if params.methods[method].search != POSTERIOR:
         return IdentifiedBand(start, evaluations, None)
     density = fit_posterior(
         params,

@@ -20,12 +20,12 @@ from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.objective.box import SearchBox, latin_hypercube
 from sling2sim2real.identification.objective.evaluate import Evaluation, Penalty
 from sling2sim2real.settings import Params
-from sling2sim2real.settings.identification import LEAST_SQUARES
+from sling2sim2real.settings.identification import POSTERIOR
 
 FOLDER = "sling2sim2real.identification.searches"
 OURS = {
-    "de": f"{FOLDER}.differential_evolution:differential_evolution",
-    "bo": f"{FOLDER}.bayesian:bayesian",
+    "de": f"{FOLDER}.de:differential_evolution",
+    "bo": f"{FOLDER}.bo:bayesian",
     "adam": f"{FOLDER}.adam:adam",
 }
 
@@ -112,7 +112,7 @@ def rollouts_of(params: Params, method: str) -> int:
     """
     optimizer = params.optimizer
     count = optimizer.population * (optimizer.generations + 1)
-    if params.methods[method].search in ("multistart", LEAST_SQUARES):
+    if params.methods[method].search in ("multistart", POSTERIOR):
         return count
     return count + optimizer.cma_rollouts
 
@@ -139,7 +139,7 @@ def explore(
         moves = {"mutation": optimizer.mutation, "recombination": optimizer.recombination}
         settings = moves | settings
     budget = {"rollouts": rollouts, "seed": optimizer.seed, "population": optimizer.population}
-    if name == LEAST_SQUARES:
+    if name == POSTERIOR:
         phase, search = "design", design
     else:
         phase, search = function_of(name)

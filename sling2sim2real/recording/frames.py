@@ -226,6 +226,8 @@ def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
 def _missing(recording: Recording, name: str, frame: str, other: str) -> UserError:
     """Neither params nor /tf_static say where the fork stands in a frame, nor by way of another."""
     has = ", ".join(recording.transforms.frames) or "nothing"
+    twice = " and ".join(map(repr, sorted(recording.transforms.doubled)))
+    has += f", and {twice} at two places, of which the last counts" if twice else ""
     if not frame:
         return UserError(
             f"{recording.path}: messages name no frame that /tf_static could join to"

@@ -406,9 +406,10 @@ class _Chooser:
         if not self.container.channels:
             return UserError(f"no {what}; the file has no messages at all: record it again")
         has = sorted({f"{c.topic} ({kind_of(_type(c))})" for c in self.container.channels})
+        types = ", ".join(READERS[role])
         return UserError(
-            f"no {what}; the file has {few(has, SHOWN)}: record it, or name its topic in"
-            f" setup.topics.{role}"
+            f"no {what}; the file has {few(has, SHOWN)}, and none of a type that is read for it"
+            f" ({types}): record one"
         )
 
     def _named(self, role: str, name: str) -> Choice:

@@ -16,6 +16,8 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.schema import FILLED, Name, Section, explained, refusal
 from sling2sim2real.base.target import TARGET_AREA
 from sling2sim2real.settings.identification import (
+    OWN,
+    SEARCHES,
     LossParams,
     MethodDefaults,
     MethodParams,
@@ -23,17 +25,17 @@ from sling2sim2real.settings.identification import (
     ParameterBoxes,
     SlingParams,
     check_method,
-    methods_by_step,
 )
-from sling2sim2real.settings.lab import BandName, BandParams, PlanParams, RunParams, SetupParams
+from sling2sim2real.settings.lab import BandParams, PlanParams, SetupParams
 from sling2sim2real.settings.launches import FloorParams, LaunchParams, PolicyParams, TrialsParams
 from sling2sim2real.settings.recording import CloudParams, EpisodeParams, ForceParams
+from sling2sim2real.settings.run import UNIONS, RunParams
 from sling2sim2real.settings.virtual_rig import RigParams
 
 
 class Params(Section):
     run: RunParams
-    bands: Annotated[dict[BandName, BandParams], FILLED]
+    bands: Annotated[dict[Name, BandParams], FILLED]
     setup: SetupParams
     plan: PlanParams
     episode: EpisodeParams
@@ -68,52 +70,45 @@ class Params(Section):
 
     @model_validator(mode="after")
     def _names_agree(self) -> Params:
+        run = self.run
         for key, names, defined in (
-            ("bands", self.run.bands, self.bands),
-            ("own", self.run.own, self.bands),
-            ("dips", self.run.dips, self.bands),
-            ("methods", self.run.methods, self.methods),
-            ("ablations.methods", self.run.ablations.methods, self.methods),
+            ("run.recordings", [entry.band for entry in run.recordings.values()], self.bands),
+            ("run.pairs", [pair.method for pair in run.pairs.values()], self.methods),
         ):
             for name in names:
                 if name not in defined:
-                    raise refusal(f"run.{key}: {name} is not one of {', '.join(defined)}")
-        for band in self.run.ablations.bands:
-            if band not in self.run.bands:
-                raise refusal(f"run.ablations.bands: {band} is not one of run.bands")
-        for band in self.run.own:
-            if self.bands[band].source == "rig":
-                raise refusal(f"run.own: {band} has source: rig, so it belongs under run.bands")
-        for band in self.run.dips:
-            if self.bands[band].source == "recording":
-                raise refusal(f"run.dips: {band} has source: recording: put it under run.own")
-        first = self.run.methods[:1]
-        for key, steps, whose, methods in (
-            ("run.steps", self.run.steps, "run.methods", self.run.methods),
-            ("run.own_steps", self.run.own_steps, "run.methods[0]", first),
-            (
-                "run.ablations.steps",
-                self.run.ablations.steps,
-                "run.ablations.methods",
-                self.run.ablations.methods,
-            ),
-        ):
-            for step, names in methods_by_step(methods, self.methods).items():
-                if list(getattr(steps, step)) != names:
+                    raise refusal(f"{key}: {name} is not one of {', '.join(defined)}")
+        for key, recording in run.recordings.items():
+            if (self.bands[recording.band].source == "rig") != (key in run.rig):
+                where = "recordings alone" if key in run.rig else "rig"
+                source = self.bands[recording.band].source
+                raise refusal(f"run.{where}: wants {key}, whose band has source: {source}")
+        for recording in run.rig.values():
+            for name, defined in (("bands", self.rig.bands), ("recordings", self.rig.recordings)):
+                wanted = recording.band if name == "bands" else recording.recording
+                if wanted not in defined:
+                    raise refusal(f"rig.{name}: lacks {wanted}, which the rig is to record")
+        for band in run.floors:
+            if band not in self.rig.bands or band not in self.bands:
+                raise refusal(f"run.floors: {band} is no band of the rig")
+        return self
+
+    @model_validator(mode="after")
+    def _pairs_go_through_the_steps_of_their_search(self) -> Params:
+        for kind in UNIONS["pairs"]:
+            for key, pair in getattr(self.run, kind).items():
+                search = self.methods[pair.method].search
+                wanted = search if search in UNIONS["explored"] else "search"
+                if kind != wanted:
                     raise refusal(
-                        f"{key}.{step}: must list those of {whose} whose search has this step:"
-                        f" [{', '.join(names)}]"
+                        f"run.{kind}: {key} belongs under run.{wanted}, for methods.{pair.method}"
+                        f" has search: {search}"
                     )
-        for key, run in (("run", self.run), ("run.ablations", self.run.ablations)):
-            rig = [name for name in run.bands if self.bands[name].source == "rig"]
-            if list(run.rig) != rig:
-                raise refusal(
-                    f"{key}.rig: must list those of {key}.bands that have source: rig, in the same"
-                    f" order: [{', '.join(rig)}]"
-                )
-        for name in (*self.run.rig, *self.run.dips):
-            if name not in self.rig.bands:
-                raise refusal(f"rig.bands: lacks {name}, which the rig is to record")
+                code = (search if search in SEARCHES else OWN) if kind == "search" else None
+                if pair.search != code:
+                    raise refusal(
+                        f"run.{kind}.{key}.search: must be {code or 'left out'}: whose code it runs"
+                    )
         return self
 
     @model_validator(mode="after")
@@ -130,19 +125,6 @@ class Params(Section):
                     f"bands.{name}.rest_length: {band.rest_length:g} must be longer than"
                     f" setup.fork_width, {self.setup.fork_width:g}"
                 )
-        return self
-
-    @model_validator(mode="after")
-    def _likes_have_one_size(self) -> Params:
-        for name, band in self.rig.bands.items():
-            if band.like is None or not {name, band.like} <= self.bands.keys():
-                continue
-            for what in ("mass", "diameter", "rest_length"):
-                if getattr(self.bands[name], what) != getattr(self.bands[band.like], what):
-                    raise refusal(
-                        f"bands.{name}.{what}: must be that of {band.like}, which"
-                        f" rig.bands.{name} is like"
-                    )
         return self
 
     @model_validator(mode="after")

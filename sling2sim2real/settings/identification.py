@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, create_model, model_validator
@@ -10,7 +9,6 @@ from pydantic import AfterValidator, create_model, model_validator
 from sling2sim2real.base.imported import is_import
 from sling2sim2real.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
 from sling2sim2real.parameters import THETA, added_by, parameters
-from sling2sim2real.settings.lab import StepParams
 
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound", bound=float)
@@ -18,16 +16,12 @@ KTop = Annotated[int, Range(1, 50)]
 Law = Literal["neo_hookean", "rubber", "corotated"]  # of the band's material
 # What each has beside the parameters of every law, and how far its box may reach.
 LAWS = {law: added_by(law) for law in get_args(Law)}
-LEAST_SQUARES = "least_squares"
+POSTERIOR = "posterior"
 UNSEEN = tuple(  # what a pull does not show
     row.name for row in parameters("neo_hookean") if row.coordinate is None
 )
-SEARCHES = ("multistart", LEAST_SQUARES, "de", "bo", "adam")
-STEPS = {  # stages of a search before `theta`; a function of the user's has `search`
-    "multistart": ("history", "clusters", "cma"),
-    LEAST_SQUARES: ("history", "density"),
-    **{name: (name,) for name in ("de", "bo", "adam")},
-}
+SEARCHES = ("multistart", POSTERIOR, "de", "bo", "adam")
+OWN = "own"  # any other: a function of the user's
 OUR_ENGINE = "sling"
 ENGINES = OUR_ENGINE, "physx"
 
@@ -182,19 +176,19 @@ class MethodParams(MethodDefaults):
         return self
 
     @model_validator(mode="after")
-    def _least_squares_fixes_the_unseen(self) -> MethodParams:
-        if self.search != LEAST_SQUARES:
+    def _posterior_fixes_the_unseen(self) -> MethodParams:
+        if self.search != POSTERIOR:
             return self
         more = {*self.fixed} - {*UNSEEN}
         if not (more <= {*LAWS[self.law]} and {*UNSEEN} <= {*self.fixed}):
             raise refusal(
-                f"search: {LEAST_SQUARES} wants `fixed` to name {', '.join(UNSEEN)}, which no pull"
+                f"search: {POSTERIOR} wants `fixed` to name {', '.join(UNSEEN)}, which no pull"
                 " shows, and besides them no more than what its law adds"
             )
         if self.settings:
-            raise refusal(f"settings: {LEAST_SQUARES} has none")
+            raise refusal(f"settings: {POSTERIOR} has none")
         if self.engine != OUR_ENGINE:
-            raise refusal(f"search: {LEAST_SQUARES} wants engine: {OUR_ENGINE}")
+            raise refusal(f"search: {POSTERIOR} wants engine: {OUR_ENGINE}")
         return self
 
     @model_validator(mode="after")
@@ -211,23 +205,6 @@ class MethodParams(MethodDefaults):
 def parameter_names(law: str) -> tuple[str, ...]:
     """What a search of a law may search, in the order of all tables: THETA, then what it adds."""
     return (*THETA, *LAWS[law])
-
-
-def methods_by_step(
-    methods: Iterable[str], methods_params: Mapping[str, MethodParams]
-) -> dict[str, list]:
-    """What `run.steps` must hold for `methods`, each of which is in `known`."""
-    by_step: dict[str, list] = {step: [] for step in StepParams.model_fields}
-    for name in methods:
-        for step in steps_of(methods_params[name].search):
-            if step in by_step:  # `cma` has the list of `clusters`
-                by_step[step].append(name)
-    return by_step
-
-
-def steps_of(search: str) -> tuple[str, ...]:
-    """The stages of a search, the last of which writes its evaluations."""
-    return STEPS.get(search, ("search",))
 
 
 def check_method(

@@ -1,4 +1,4 @@
-"""What params.yaml says of a lab: what to run, bands, set-up and recorded pull."""
+"""What params.yaml says of a lab: bands, set-up and recorded pull."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from sling2sim2real.base.schema import (
     Component,
     Direction,
     Metres,
-    Name,
-    Names,
     Pose,
     Range,
     Section,
@@ -32,61 +30,6 @@ def _lies_beside(name: str) -> str:
 
 
 FileName = Annotated[str, FILLED, AfterValidator(_lies_beside)]
-
-
-def _is_free(name: str) -> str:
-    if name.lower() == "measured":
-        raise refusal("data/trials/measured holds measured landings, choose another name")
-    return name
-
-
-BandName = Annotated[Name, AfterValidator(_is_free)]
-
-
-class StepParams(Section):
-    """The methods that go through a step of their search, by the step's stage in dvc.yaml.
-
-    They follow from `methods.<name>.search`, which DVC cannot look up.
-    """
-
-    history: Names
-    clusters: Names
-    density: Names
-    de: Names
-    bo: Names
-    adam: Names
-    search: Names
-
-
-class Ablations(Section):
-    """Methods that run on some bands only."""
-
-    bands: Names
-    rig: Names
-    methods: Names
-    steps: StepParams
-
-
-class RunParams(Section):
-    bands: Annotated[Names, FILLED]
-    rig: Names
-    own: Names
-    dips: Names
-    methods: Annotated[Names, FILLED]
-    steps: StepParams
-    own_steps: StepParams
-    ablations: Ablations
-
-    @model_validator(mode="after")
-    def _nothing_runs_twice(self) -> RunParams:
-        for method in self.ablations.methods:
-            if method in self.methods:
-                raise refusal(f"ablations.methods: {method} is one of run.methods already")
-        for key, bands in (("own", self.own), ("dips", self.dips)):
-            for band in bands:
-                if band in self.bands:
-                    raise refusal(f"{key}: {band} is one of run.bands already")
-        return self
 
 
 class BandParams(Section):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import model_validator
@@ -66,10 +65,8 @@ class RigSoftening(Section):
 
 
 class RigBand(Section):
-    """What a band is made of, and how it is pulled; one that is `like` another has its rubber."""
+    """What a band is made of."""
 
-    like: Name | None
-    pull: Pull | None
     peak_force: Annotated[float, Range(0.1, 1000)]
     relaxation: Annotated[tuple[Relaxation, ...], LIST]
     viscosity: Annotated[float, Range(1e-4, 0.1)]
@@ -98,19 +95,15 @@ class RigBand(Section):
         return self
 
 
-def _whole(name: str, band: object, bands: Mapping[str, object]) -> object:
-    """A band of `rig.bands` with what it leaves out because it is like another of them."""
-    if not isinstance(band, dict) or not isinstance(band.get("like"), str):
-        return band
-    other, key = bands.get(band["like"]), f"bands.{name}.like"
-    if not isinstance(other, dict):
-        raise refusal(f"{key}: {band['like']} is not one of {', '.join(bands)}")
-    if other.get("like") is not None:
-        raise refusal(f"{key}: {band['like']} is itself like {other['like']}: name that")
-    for what in band.keys() - {"like", "pull"}:
-        if band[what] != other.get(what):
-            raise refusal(f"{key}: has the rubber of {band['like']}: leave out {what}")
-    return {**other, **band}
+class RigRecording(Section):
+    """How a recording is made: by which pull, and what tells its random numbers from others'.
+
+    Attributes:
+        stream: Stands behind the band's name where random numbers are drawn.
+    """
+
+    pull: Pull
+    stream: str
 
 
 class RigWrench(Section):
@@ -178,22 +171,13 @@ class RigParams(Section):
     wrench: RigWrench
     camera: RigCamera
     draws: dict[str, Annotated[tuple[Value, Value], LIST, ASCENDING]]
-    pull: Pull
+    launch_draws: dict[str, Annotated[tuple[Value, Value], LIST, ASCENDING]]
+    recordings: dict[Name, RigRecording]
     bands: dict[Name, RigBand]
-
-    @model_validator(mode="before")
-    @classmethod
-    def _likes_are_whole(cls, content: object) -> object:
-        """A band that is like another has all else of it."""
-        bands = content.get("bands") if isinstance(content, dict) else None
-        if not isinstance(bands, dict):
-            return content
-        whole = {name: _whole(name, band, bands) for name, band in bands.items()}
-        return {**content, "bands": whole}  # pyright: ignore[reportGeneralTypeIssues]
 
     @model_validator(mode="after")
     def _draws_are_of_keys(self) -> RigParams:
-        for key in self.draws:
+        for key in (*self.draws, *self.launch_draws):
             value: object = self
             for name in key.split("."):
                 value = getattr(value, name, None)

@@ -81,10 +81,10 @@ def test_a_run_of_other_settings_says_what_has_changed(tmp_path) -> None:
     """And so does what is aimed by it."""
     shutil.copy(DEFAULTS, tmp_path)
     params = Settings.load(tmp_path / "params.yaml")
-    made = settings_of(params, "band1", "least_squares") | {"bands.band1.mass": 0.05}
+    made = settings_of(params, "band1", "posterior") | {"bands.band1.mass": 0.05}
     soft = dict(zip(THETA, (2.2e5, 0.45, 2e-3, 0.5, 1.0), strict=True))
     write_json(
-        Layout(tmp_path).theta("band1", "least_squares"),
+        Layout(tmp_path).theta("band1", "posterior"),
         {"band": "band1", "theta": soft, "made_with": made},
     )
     identification = Identification.of_run("band1", root=tmp_path)

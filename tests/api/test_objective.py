@@ -25,7 +25,7 @@ def test_it_is_the_loss_of_the_method(world, episode) -> None:
 
 
 def test_theta_and_unit_cube_go_with_each_other(world, episode) -> None:
-    objective = Objective(world, [episode], method="least_squares")
+    objective = Objective(world, [episode], method="posterior")
     assert objective.theta(objective.unit(world.theta)).law == "rubber"
     back = objective.theta(objective.unit(world.theta))
     assert np.allclose(back.point, world.theta.point)
@@ -36,7 +36,7 @@ def test_a_loss_of_ones_own(world, episode) -> None:
     def peak(simulated, recorded) -> float:
         return abs(float(simulated.force.max() - recorded.force.max()))
 
-    objective = Objective(world, [episode], method="least_squares", loss=peak)
+    objective = Objective(world, [episode], method="posterior", loss=peak)
     true = objective.unit(world.theta)
     softer = true - 0.05 * (np.arange(len(true)) == 0)
     here, there = objective(np.stack([true, softer]))

@@ -48,7 +48,7 @@ params = load(DEFAULTS)
 sling, episode = recorded_yardstick(params)
 thetas = Parameters.of(sling.law, np.array([THETA, THETA]) * [[0.8], [1.1]])
 rollouts = interact(sling, episode, thetas)
-losses = EpisodeLoss.of(params, "sling2sim2real", episode, sling).terms(rollouts)
+losses = EpisodeLoss.of(params, "paper", episode, sling).terms(rollouts)
 setup = LaunchSetup.of(params.setup, params.sling)
 shots = launch(sling, setup, thetas, draws=np.array([[-0.35, -0.15]]))
 numbers = [rollouts.force, rollouts.center_line, *losses.values(), *vars(shots).values()]

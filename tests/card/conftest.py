@@ -19,7 +19,7 @@ from tests.project import write_params_of
 from validation.projects import ROUGH
 from validation.recordings.bag import Truth, write_bag
 
-BAND, METHOD = "toy", "least_squares"
+BAND, METHOD = "toy", "posterior"
 TRUTH = Truth()
 THETA = {
     "youngs_modulus": 3e5,

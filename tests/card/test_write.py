@@ -62,6 +62,6 @@ def test_equal_inputs_give_equal_bytes(folder, copied) -> None:
 def test_a_missing_input_leaves_nothing_half_written(copied) -> None:
     layout = Layout(copied)
     layout.trials(BAND, METHOD).unlink()
-    with pytest.raises(UserError, match=r"data/trials/toy/least_squares\.parquet"):
+    with pytest.raises(UserError, match=r"data/trials/toy/posterior\.parquet"):
         write(load(copied / "params.yaml"), BAND, METHOD, copied)
     assert not layout.card(BAND).exists()

@@ -74,7 +74,7 @@ def test_the_documented_commands_are_understood() -> None:
     assert (launched.theta, launched.draw) == (Path("t.json"), (-0.30, -0.17))
     assert parse("launch --band band1 --draw=-0.3,-0.1".split()).method is None
     aimed = parse("aim --band band1 --target 1.925".split())
-    assert (aimed.method, aimed.target, aimed.json) == ("least_squares", 1.925, False)
+    assert (aimed.method, aimed.target, aimed.json) == ("posterior", 1.925, False)
     assert not aimed.force and parse("aim --band b --target 2 --force".split()).force
     assert parse("aim --band band1 --method m --target 1.925".split()).method == "m"
 
@@ -158,10 +158,10 @@ def test_a_reader_that_has_seen_enough() -> None:
 def aimable(folder: Path) -> None:
     """A project with a policy of band1."""
     shutil.copy(DEFAULTS, folder)
-    theta = folder / "data/theta/band1/least_squares.json"
+    theta = folder / "data/theta/band1/posterior.json"
     theta.parent.mkdir(parents=True)
     theta.write_text(json.dumps({"band": "band1", "theta": SOFT}))
-    policy = folder / "data/policies/band1/least_squares/policy.onnx"
+    policy = folder / "data/policies/band1/posterior/policy.onnx"
     write_policy(policy, slope=(-0.01, 0.0), offset=(-0.31, -0.15))
 
 
@@ -203,17 +203,17 @@ def test_aim_prints_one_json_object(tmp_path: Path, sling: Callable) -> None:
 
 def test_aim_names_the_stage_that_makes_what_is_missing(tmp_path: Path, refused) -> None:
     aimable(tmp_path)
-    (tmp_path / "data/policies/band1/least_squares/policy.onnx").unlink()
+    (tmp_path / "data/policies/band1/posterior/policy.onnx").unlink()
     aim = ("aim", "--band", "band1", "--target", "1.9")
     line = refused(1, *aim, folder=tmp_path)
     assert "policy.onnx: missing" in line
-    assert "dvc repro policy@band1-least_squares" in line
+    assert "dvc repro policy@band1-posterior" in line
     aim = (*aim, "--method", "de")
     assert refused(1, *aim, folder=tmp_path).endswith(
         "de.json: missing; `dvc repro ablation_theta@band1-de` makes it"
     )
     theta = tmp_path / "data/theta/band1"
-    shutil.copy(theta / "least_squares.json", theta / "de.json")
+    shutil.copy(theta / "posterior.json", theta / "de.json")
     assert refused(1, *aim, folder=tmp_path).endswith(
         "policy.onnx: missing; `dvc repro ablation_policy@band1-de` makes it"
     )

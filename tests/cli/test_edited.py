@@ -15,7 +15,7 @@ from tests.card.conftest import POINT, samples, theta_file
 from tests.edited import edits, outcomes
 from tests.project import DEFAULTS
 
-BAND, METHOD, DRAW = "band1", "least_squares", (-0.3, -0.15)
+BAND, METHOD, DRAW = "band1", "posterior", (-0.3, -0.15)
 
 
 @pytest.fixture(scope="module")

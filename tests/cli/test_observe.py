@@ -28,7 +28,7 @@ def put(tmp_path, params, monkeypatch):
     monkeypatch.setattr(observe, "repro", repro)
     failures = []
 
-    def run(draw=DRAW, landing=LANDING, band="band1", method="least_squares", **options) -> dict:
+    def run(draw=DRAW, landing=LANDING, band="band1", method="posterior", **options) -> dict:
         return observe.observe(params, band, method, draw, landing, root=tmp_path, **options)
 
     return SimpleNamespace(run=run, requested=requested, failures=failures, layout=Layout(tmp_path))
@@ -41,7 +41,7 @@ def test_a_launch_is_written_below_the_others_and_the_policy_runs(put) -> None:
     assert file.read_text() == (
         "draw_y_m,draw_z_m,draw_error_m,landing_y_m\n-0.3,-0.17,,2.2\n-0.32,-0.2,0.0,3.0\n"
     )
-    assert put.requested == ["policy@band1-least_squares"] * 2
+    assert put.requested == ["policy@band1-posterior"] * 2
     answer = {"file": str(file), "launches": 1, "before": None, "after": None, "warnings": []}
     assert first == answer | {"measured_m": LANDING}
     assert list(file.parent.iterdir()) == [file]
@@ -64,7 +64,7 @@ def test_a_stage_that_fails_says_why_and_the_launch_stays(put) -> None:
     [
         ({"band": "none"}, "--band none: not in params.yaml"),
         ({"method": "none"}, "--method none: not in params.yaml"),
-        ({"method": "sling2sim2real"}, "takes no launches as evidence"),
+        ({"method": "paper"}, "takes no launches as evidence"),
         ({"draw": (-0.3, -0.6)}, "lies below the floor"),
     ],
 )
@@ -97,7 +97,7 @@ def test_an_equal_launch_is_one_more_where_that_is_said(put) -> None:
 def test_undo_takes_the_last_launch_out_and_the_policy_runs(put, params) -> None:
     def undo(**options) -> dict:
         root = put.layout.root
-        return observe.undo(params, "band1", "least_squares", root=root, **options)
+        return observe.undo(params, "band1", "posterior", root=root, **options)
 
     put.run(run=False)
     before = (put.layout.evidence / "band1.csv").read_text()
@@ -106,7 +106,7 @@ def test_undo_takes_the_last_launch_out_and_the_policy_runs(put, params) -> None
     assert (put.layout.evidence / "band1.csv").read_text() == before
     assert (answer["launches"], answer["measured_m"]) == (1, 3.0)
     assert answer["removed"] == {"draw": [-0.32, -0.2], "error": 0.001}
-    assert put.requested == ["policy@band1-least_squares"]
+    assert put.requested == ["policy@band1-posterior"]
     lines = observe.shown(answer | {"after": None}).splitlines()
     assert lines[0].endswith("1 launch as evidence")
     assert lines[1:] == ["taken out: the draw to -0.32, -0.2", "measured  3.000 m; nothing has run"]
@@ -151,13 +151,13 @@ def test_a_draw_deeper_than_any_before_is_told_once(put, params, monkeypatch, ca
     assert "count as of the softened band" in first and "0.402 m was the most" in second
     assert capsys.readouterr().err == f"warning: {first}\nwarning: {second}\n"
 
-    stays = with_(params, "methods.least_squares", fixed={"softening": 0.0})
+    stays = with_(params, "methods.posterior", fixed={"softening": 0.0})
     for whole, draw, words in (
         (with_(params, "bands.band1", preconditioned=True), (-0.6, 0.0), None),
-        (stays, (-0.7, 0.0), "least_squares leaves that out"),
+        (stays, (-0.7, 0.0), "posterior leaves that out"),
     ):
         answer = observe.observe(
-            whole, "band1", "least_squares", draw, 3.0, run=False, again=True, root=put.layout.root
+            whole, "band1", "posterior", draw, 3.0, run=False, again=True, root=put.layout.root
         )
         assert [words in warning["what"] for warning in answer["warnings"]] == (
             [True] if words else []

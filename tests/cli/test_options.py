@@ -72,9 +72,9 @@ ADDED = {
     PLAN: "--mass 0.05, --diameter 0.02, --rest-length 0.5, --draw=-0.30,-0.1, --theta none.json,"
     " --recording none.mcap, --pull paper, --precondition 1, --pulls 2, --out there, --rate 50,"
     " --json",
-    LAUNCH: "--method sling2sim2real, --theta none.json, --json",
-    AIM: "--method sling2sim2real, --force, --json",
-    OBSERVE: "--draw-error 0.002, --method sling2sim2real, --undo, --json",
+    LAUNCH: "--method paper, --theta none.json, --json",
+    AIM: "--method paper, --force, --json",
+    OBSERVE: "--draw-error 0.002, --method paper, --undo, --json",
     OBSERVE.replace("2.3", "2.2"): "--again",
     OBSERVE.removesuffix(" --no-run"): "--no-run",
     EXPORT: "--method de, --out there, --json",

@@ -10,8 +10,8 @@ from tests.project import BAND
 from validation.projects import ProjectCopy, copy_project, run_of
 
 SEARCHES = {
-    "least_squares": ("history", "density"),
-    "sling2sim2real": ("history", "clusters", "cma"),
+    "posterior": ("history", "density"),
+    "paper": ("history", "clusters", "cma"),
     "real2sim2real": ("de",),
     "package_si": ("bo",),
 }
@@ -75,7 +75,7 @@ def test_such_a_stage_is_its_namesake_but_for_the_band(
     """The same command, code and parameters; of one's own nothing of the rig."""
     from dvc.repo import Repo
 
-    project.set(run_of(["band1"], ["least_squares"]) | {"run.own": []})
+    project.set(run_of(["band1"], ["posterior"]) | {"run.own": []})
     if kind == "own_":
         add(project, band)
     else:
@@ -83,9 +83,7 @@ def test_such_a_stage_is_its_namesake_but_for_the_band(
         project.set({f"bands.{band}": {"source": "rig", **sizes}, "run.dips": [band]})
         project.set({f"rig.bands.{band}": {"like": "band1", "pull": "informative"}})
         params = load(project.folder / "params.yaml")
-        assert stage_of(params, "launches", band, "least_squares") == (
-            f"dip_launches@{band}-least_squares"
-        )
+        assert stage_of(params, "launches", band, "posterior") == (f"dip_launches@{band}-posterior")
     with Repo(str(project.folder)) as repo:
         stages = {stage.name: stage for stage in repo.index.stages}
     names = [name for name in stages if name.startswith(kind)]

@@ -16,7 +16,7 @@ from tests.project import DEFAULTS, with_
 
 VALUES = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 CONTENT = {"band": "band1", "theta": VALUES, "confidence": {"settled": True, "steps": 7}}
-STAGE = "policy@band1-least_squares"
+STAGE = "policy@band1-posterior"
 
 
 def abouts(hazards) -> list[str]:
@@ -53,13 +53,13 @@ def card(root, **content) -> None:
         "made_with": {},
         **content,
     }
-    path = Layout(root).policy("band1", "least_squares") / "card.json"
+    path = Layout(root).policy("band1", "posterior") / "card.json"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(whole))
 
 
 def of_policy(params, root, content=CONTENT) -> list[safety.Hazard]:
-    return list(safety.of_policy(params, "band1", "least_squares", content, root))
+    return list(safety.of_policy(params, "band1", "posterior", content, root))
 
 
 def test_a_draw_outside_the_box(params, project) -> None:
@@ -112,7 +112,7 @@ def test_a_posterior_that_has_not_settled_or_is_not_there(tmp_path) -> None:
 
 def identified(params, **then) -> dict:
     """Content of a θ file that was made with other settings than today's: `then`, by key."""
-    return CONTENT | {"made_with": settings_of(params, "band1", "least_squares") | then}
+    return CONTENT | {"made_with": settings_of(params, "band1", "posterior") | then}
 
 
 def trained(params, **then) -> dict:
@@ -174,7 +174,7 @@ def test_a_policy_without_a_card(params, project) -> None:
 
 def test_theta_of_a_run_and_by_hand(params, project) -> None:
     content = identified(params, **{"bands.band1.mass": 0.05})
-    path, cure = Layout(project).theta("band1", "least_squares"), "theta@band1-least_squares"
+    path, cure = Layout(project).theta("band1", "posterior"), "theta@band1-posterior"
     summary = [hazard.what for hazard in safety.of_identification(params, content, path)]
     assert summary == [
         "params.yaml: bands.band1.mass was 0.05, is 0.023, since θ was identified:"
@@ -188,9 +188,9 @@ def test_theta_of_a_run_and_by_hand(params, project) -> None:
 
 def test_launches_as_evidence_are_settings_too(params, project) -> None:
     seen = {"settled": True, "steps": 7, "launches": [{}]}
-    then = settings_of(params, "band1", "least_squares") | evidence_settings_of(params)
+    then = settings_of(params, "band1", "posterior") | evidence_settings_of(params)
     content = CONTENT | {"confidence": seen, "made_with": then | {"setup.projectile_mass": 0.05}}
-    path = Layout(project).theta("band1", "least_squares")
+    path = Layout(project).theta("band1", "posterior")
     (hazard,) = safety.of_identification(params, content, path)
     assert "setup.projectile_mass was 0.05, is 0.039" in hazard.what
 

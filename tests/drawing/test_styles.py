@@ -36,5 +36,5 @@ def test_ours_the_papers_and_its_baselines_are_drawn_first(methods: list[str]) -
     chosen = drawn(methods)
     assert len(chosen) == min(FEW, len(methods))
     assert chosen == [method for method in methods if method in chosen]
-    first = ["least_squares", "sling2sim2real"]
+    first = ["posterior", "paper"]
     assert set(first) & set(methods) <= set(chosen)

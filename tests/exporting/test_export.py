@@ -29,7 +29,7 @@ def test_what_it_refuses(model, tmp_path, monkeypatch) -> None:
 def test_the_command(tmp_path, sling) -> None:
     """With a θ file written by hand; a second run replaces the first."""
     shutil.copy(DEFAULTS, tmp_path)
-    theta = tmp_path / "data/theta/band1/least_squares.json"
+    theta = tmp_path / "data/theta/band1/posterior.json"
     theta.parent.mkdir(parents=True)
     soft = dict(zip(THETA, (2.2e5, 0.45, 2e-3, 0.5, 1.0), strict=True))
     theta.write_text(json.dumps({"band": "band1", "theta": soft}))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sqlite3
 from pathlib import Path
 
 import pytest
+from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording.files import (
@@ -47,14 +49,18 @@ def test_a_split_bag_is_one_recording(whole, parts, params) -> None:
 
 
 RAW = "RIHS01_" + 64 * "0"
-HUMBLE = get_typestore(Stores.ROS2_HUMBLE)
+HUMBLE, NOETIC = get_typestore(Stores.ROS2_HUMBLE), get_typestore(Stores.ROS1_NOETIC)
+TF = "geometry_msgs/TransformStamped[] transforms"
+NOETIC.register(get_types_from_msg(TF, "tf2_msgs/msg/TFMessage"))
 
 
+@pytest.mark.parametrize("plugin", StoragePlugin)
 @pytest.mark.parametrize("own_types", [True, False])
-def test_the_bag_that_a_library_of_others_writes(own_types, whole, tmp_path, params) -> None:
+def test_the_bag_that_a_library_of_others_writes(
+    own_types, plugin, whole, tmp_path, params
+) -> None:
     """rosbags names its file and writes the metadata; its one part is the recording."""
     folder, connections = tmp_path / "other", {}
-    plugin = StoragePlugin.MCAP
     with BagWriter(folder, version=9, storage_plugin=plugin) as bag:
         for schema, channel, message in messages_of(whole):
             if channel.topic not in connections:
@@ -62,9 +68,69 @@ def test_the_bag_that_a_library_of_others_writes(own_types, whole, tmp_path, par
                 types = {"typestore": HUMBLE} if own_types else given
                 connections[channel.topic] = bag.add_connection(channel.topic, schema.name, **types)
             bag.write(connections[channel.topic], message.log_time, message.data)
-    assert [part.name for part in parts_of(folder)] == ["other.mcap"]
+    suffix = {StoragePlugin.MCAP: "mcap", StoragePlugin.SQLITE3: "db3"}[plugin]
+    assert [part.name for part in parts_of(folder)] == [f"other.{suffix}"]
     assert_same_recording(read_recording(folder, params.setup), read_recording(whole, params.setup))
-    assert sha256(folder) == sha256(folder / "other.mcap") and name_of(folder) == "other"
+    assert sha256(folder) == sha256(folder / f"other.{suffix}") and name_of(folder) == "other"
+
+
+def test_a_file_of_sqlite_without_metadata_or_definitions(whole, tmp_path, params) -> None:
+    """As Humble writes it; and one whose end is damaged."""
+    folder = tmp_path / "other"
+    connections = {}
+    with BagWriter(folder, version=8, storage_plugin=StoragePlugin.SQLITE3) as bag:
+        for schema, channel, message in messages_of(whole):
+            if channel.topic not in connections:
+                add = bag.add_connection
+                connections[channel.topic] = add(channel.topic, schema.name, typestore=HUMBLE)
+            bag.write(connections[channel.topic], message.log_time, message.data)
+    file = tmp_path / "alone.db3"
+    (folder / "other.db3").rename(file)
+    base = sqlite3.connect(file)
+    base.execute("DROP TABLE message_definitions")
+    base.commit()
+    base.close()
+    assert_same_recording(read_recording(file, params.setup), read_recording(whole, params.setup))
+    assert name_of(file) == "alone"
+    whole_file = file.read_bytes()
+    page = 4096 * (len(whole_file) // 8192)
+    file.write_bytes(whole_file[:page] + bytes(4096) + whole_file[page + 4096 :])
+    assert "the rest of the file cannot be read" in read_container(file).losses[0]
+    file.write_bytes(whole_file[: len(whole_file) // 2])
+    with pytest.raises(UserError, match="alone.db3: is no ROS 2 bag, or a damaged one"):
+        read_container(file)
+    file.write_bytes(b"SQLite format 3\0" + bytes(100))
+    with pytest.raises(UserError, match="alone.db3: is no ROS 2 bag, or a damaged one"):
+        read_container(file)
+
+
+def test_a_bag_of_ros_1(whole, tmp_path, params) -> None:
+    file, connections = tmp_path / "my.bag", {}
+    with Ros1Writer(file) as bag:
+        for schema, channel, message in messages_of(whole):
+            kind = schema.name
+            if channel.topic not in connections:
+                add = bag.add_connection
+                connections[channel.topic] = add(channel.topic, kind, typestore=NOETIC)
+            content = HUMBLE.deserialize_cdr(message.data, kind)
+            data = NOETIC.serialize_ros1(as_ros1(content), kind)
+            bag.write(connections[channel.topic], message.log_time, data)
+    assert_same_recording(read_recording(file, params.setup), read_recording(whole, params.setup))
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    with pytest.raises(UserError, match="my.bag: a damaged ROS 1 bag .*: `rosbag reindex` it"):
+        read_container(file)
+
+
+def as_ros1(content):
+    """A message of ROS 2 with what ROS 1 has besides: the header's number; names in capitals."""
+    if not hasattr(content, "__msgtype__"):
+        return [as_ros1(part) for part in content] if isinstance(content, list) else content
+    fields = {name: as_ros1(value) for name, value in vars(content).items()}
+    if content.__msgtype__ == "std_msgs/msg/Header":
+        fields["seq"] = 0
+    if content.__msgtype__ == "sensor_msgs/msg/CameraInfo":
+        fields |= {name.upper(): fields.pop(name) for name in "dkrp"}
+    return NOETIC.types[content.__msgtype__](**fields)
 
 
 def test_ten_parts_are_sorted_by_number(whole, tmp_path) -> None:

@@ -9,10 +9,11 @@ import pytest
 from mcap.records import Schema
 from mcap_ros2._dynamic import serialize_dynamic
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording import kinematics
-from sling2sim2real.recording.messages import Channel, Unreadable
+from sling2sim2real.recording import kinematics, messages
+from sling2sim2real.recording.messages import READERS, Channel, Unreadable
 from tests.recording.messages import (
     COUNT,
     FORCE,
@@ -44,6 +45,76 @@ def test_a_pose_with_covariance(params) -> None:
         frame == "base" and choice.why == "the only PoseWithCovarianceStamped for end-effector pose"
     )
     assert_poses(values)
+
+
+def test_an_odometry_and_one_pose_of_several(params) -> None:
+    odometry = [
+        {**head(k), "child_frame_id": "tcp", "pose": {"pose": pose_fields(POSES[k])}}
+        for k in range(COUNT)
+    ]
+    poses = [
+        {
+            "timestamp": head(k)["header"]["stamp"],
+            "frame_id": "base",
+            "poses": [pose_fields(POSES[k])],
+        }
+        for k in range(COUNT)
+    ]
+    for kind, messages in (("nav_msgs/Odometry", odometry), ("foxglove.PosesInFrame", poses)):
+        frame, values = played(
+            chosen(params, wrench("/ft"), channel("/hand", kind, messages))["pose"]
+        )
+        assert frame == "base"
+        assert_poses(values)
+    assert chosen(params, wrench("/ft"), pose("/a"), channel("/ee", kind, messages))["pose"].channel
+    several = [{**message, "poses": 2 * message["poses"]} for message in poses]
+    with pytest.raises(UserError, match="/hand has fewer than two readable messages"):
+        chosen(params, wrench("/ft"), channel("/hand", "foxglove.PosesInFrame", several))
+
+
+def stamped(k: int, parent: str, child: str, values: np.ndarray) -> dict:
+    fields = pose_fields(values)
+    transform = {"translation": fields["position"], "rotation": fields["orientation"]}
+    return {**head(k, parent), "child_frame_id": child, "transform": transform}
+
+
+def test_a_hand_that_is_in_tf_alone(params) -> None:
+    """Over two joints, the first of which turns, and a tool that /tf_static fixes on the hand."""
+    first = Rotation.from_rotvec(np.stack([0 * TIMES, 0 * TIMES, 0.5 * TIMES], axis=1))
+    place = np.array([0.1, 0.0, 0.2])
+    back = first.inv()
+    second = np.hstack([back.apply(PLACES - place), (back * TURNS).as_quat()])
+    tool = np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0])
+    moving = [
+        {
+            "transforms": [
+                stamped(k, "base", "link1", np.append(place, first[k].as_quat())),
+                stamped(k, "link1", "hand", second[k]),
+            ]
+        }
+        for k in range(COUNT)
+    ]
+    still = [{"transforms": [stamped(0, "hand", "hand_tcp", tool)]}]
+    topics = [
+        channel("/tf", "tf2_msgs/msg/TFMessage", moving),
+        channel("/tf_static", "tf2_msgs/msg/TFMessage", still),
+    ]
+    choice = chosen(params, wrench("/ft"), *topics)["pose"]
+    frame, values = played(choice)
+    assert frame == "base" and choice.channel.topic == "/tf"
+    np.testing.assert_allclose(values[:, :3], PLACES + TURNS.apply([0.0, 0.0, 0.1]), atol=1e-9)
+    named = chosen(params, wrench("/ft"), *topics, tip_link="link1")["pose"]
+    np.testing.assert_allclose(played(named)[1][:, :3], np.tile(place, (COUNT, 1)), atol=1e-9)
+    with pytest.raises(UserError, match="/tf moves hand, link1: name the frame of the tool"):
+        chosen(params, wrench("/ft"), topics[0])
+
+
+def test_a_type_is_added_in_one_place(params, monkeypatch) -> None:
+    """What is in the table is kept when a file is read, chosen, and read as it says."""
+    monkeypatch.setitem(messages.READERS, "pose", {**READERS["pose"], "Hand": messages.read_pose})
+    assert messages.is_read("my_msgs/msg/Hand") and not messages.is_read("my_msgs/msg/Other")
+    sent = [{**head(k), "pose": pose_fields(POSES[k])} for k in range(COUNT)]
+    assert_poses(played(chosen(params, wrench("/ft"), channel("/h", "a/Hand", sent))["pose"])[1])
 
 
 def robot_state(topic: str = "/franka_robot_state_broadcaster/robot_state") -> Channel:

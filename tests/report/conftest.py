@@ -13,7 +13,7 @@ from pipeline.report import write as writing
 from pipeline.report.results import Result, Results, gather
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.searches.regions import Region, save_regions
-from sling2sim2real.launching.trials.measured import save_scores
+from sling2sim2real.launching.launches_file import write_launches
 from sling2sim2real.settings import load
 from sling2sim2real.simulator.parameters import THETA as NAMES
 from tests.policy.stored import write_stored
@@ -21,7 +21,8 @@ from tests.project import DEFAULTS, write_params_of
 from tests.report import toy_launches
 from tests.report.toy_replay import toy_landscape, toy_replay
 
-BAND, METHOD = "toy", "sling2sim2real"
+BAND, METHOD = "toy", "paper"
+PAIR = f"{BAND}-{METHOD}"
 THETA = {
     "youngs_modulus": 3e5,
     "poissons_ratio": 0.45,
@@ -116,27 +117,27 @@ def template(tmp_path_factory) -> Path:
     write_params_of(root, BAND, METHOD, 0.04)
     data = root / "data"
     for name in ("evaluations", "clusters", "theta", "confidence", "trials", "launches"):
-        (data / name / BAND).mkdir(parents=True)
-    episode().save(data / "episodes" / BAND / "1")
+        (data / name).mkdir(parents=True)
+    episode().save(data / "episodes" / BAND / "plain" / "1")
     phases = history("de", [3.0, np.inf, 2.0]), history("cma", [2.5, 1.25], solver=0)
     evaluations = pd.concat(phases, ignore_index=True)
-    evaluations.to_parquet(data / "evaluations" / BAND / f"{METHOD}.parquet")
-    save_scores(data / "launches" / BAND / "scores.json", [])
+    evaluations.to_parquet(data / "evaluations" / f"{PAIR}.parquet")
+    write_launches(data / "launches" / f"{BAND}.csv", [])
     region = Region(np.full(5, 0.4), 0.01 * np.eye(5), 2.0, [2, 0])
-    save_regions(data / "clusters" / BAND / f"{METHOD}.json", NAMES, [region], 5)
+    save_regions(data / "clusters" / f"{PAIR}.json", NAMES, [region], 5)
     loss = {"geom": 0.5, "force": 0.25, "work": 0.5, "total": 1.25}
     theta = {"band": BAND, "method": METHOD, "theta": THETA, "loss": loss, "rollouts": 5}
     theta["confidence"] = confidence()
-    (data / "theta" / BAND / f"{METHOD}.json").write_text(json.dumps(theta))
-    (data / "confidence" / BAND / f"{METHOD}.json").write_text(json.dumps(posterior()))
+    (data / "theta" / f"{PAIR}.json").write_text(json.dumps(theta))
+    (data / "confidence" / f"{PAIR}.json").write_text(json.dumps(posterior()))
 
-    folder = data / "policies" / BAND / METHOD
+    folder = data / "policies" / PAIR
     chart = write_stored(folder)
     chart.save(folder / "map.parquet")
     pd.DataFrame({"iteration": [1, 2], "mean_error": [0.3, 0.004]}).to_parquet(
         folder / "training.parquet"
     )
-    launches().to_parquet(data / "trials" / BAND / f"{METHOD}.parquet")
+    launches().to_parquet(data / "trials" / f"{PAIR}.parquet")
     return root
 
 

@@ -107,7 +107,7 @@ SIZE = np.hypot(STILL.time, np.sin(STILL.time))
 
 
 def test_force_over_draw_and_what_is_left_over_time(retained) -> None:
-    played = toy_replay(None, "", METHOD, RECORDED, {})
+    played = toy_replay(None, None, RECORDED, {}, None)
     pull("", {BAND: RECORDED}, {BAND: {METHOD: played}}, styles([METHOD]))
     top, middle, bottom = retained[0].axes
     measured, simulated = top.lines

@@ -12,7 +12,7 @@ BANDS = {"Soft": "band1", "Medium": "band2", "Stiff": "band3"}
 METHODS = {
     "Real2Sim2Real": "real2sim2real",
     "Package SI": "package_si",
-    "Sling2Sim2Real": "sling2sim2real",
+    "Sling2Sim2Real": "paper",
     "$DE_{L}$": "de",
     "$BO_{L}$": "bo",
     "$Adam_{L}$": "adam",

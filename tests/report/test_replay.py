@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
+from pipeline.layout import Layout
 from pipeline.report.replay import replay_method
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.loss import EpisodeLoss
@@ -18,7 +19,7 @@ from tests.project import DEFAULTS
 
 pytestmark = pytest.mark.usefixtures("nowhere")
 
-METHOD = "sling2sim2real"
+METHOD = "paper"
 THETA = dict(zip(NAMES, (3e5, 0.46, 4e-3, 0.5, 0.6), strict=True))
 SHIFT = np.array([0, 0.05, 0])  # of the clouds from where the band is
 
@@ -53,7 +54,11 @@ def recorded(sling):
 def played(params, recorded):
     episode, rollouts = recorded
     theta = {"theta": THETA}
-    return episode, rollouts, replay_method(params, "band1", METHOD, episode, theta)
+    return (
+        episode,
+        rollouts,
+        replay_method(params, params.run.pairs[f"band1-{METHOD}"], episode, theta, Layout()),
+    )
 
 
 def test_the_pause_keeps_the_force_and_nothing_pulls_before_or_after(played) -> None:

@@ -13,11 +13,11 @@ import pytest
 from pipeline.report import write as writing
 from sling2sim2real.base.layout import NotMade
 from tests.project import with_
-from tests.report.conftest import BAND, METHOD
+from tests.report.conftest import BAND, PAIR
 from tests.report.toy_run import run_of, write_run
 
 pytestmark = pytest.mark.usefixtures("no_simulation")
-THETA_FILE = f"data/theta/{BAND}/{METHOD}.json"
+THETA_FILE = f"data/theta/{PAIR}.json"
 
 
 def written(root, params) -> str:
@@ -69,7 +69,7 @@ def test_the_report_is_complete_and_equal_in_another_process(root, params) -> No
 
 
 def test_a_band_that_nobody_launched_is_told_without_emptiness(root, params, text_alone) -> None:
-    file = root / "data" / "trials" / BAND / f"{METHOD}.parquet"
+    file = root / "data" / "trials" / f"{PAIR}.parquet"
     nothing = {"kind": "predicted", "landing_y": None, "failure": None}
     pd.read_parquet(file).assign(**nothing).to_parquet(file)
     text = written(root, params)
@@ -100,10 +100,10 @@ def test_says_of_a_policy_what_it_was_trained_on(root, params, text_alone) -> No
 
 def test_names_the_input_that_is_missing(root, params) -> None:
     for name in (
-        f"episodes/{BAND}/1/signals.parquet",
-        *(f"{step}/{BAND}/{METHOD}.parquet" for step in ("evaluations", "trials")),
-        *(f"{step}/{BAND}/{METHOD}.json" for step in ("clusters", "theta")),
-        *(f"policies/{BAND}/{METHOD}/{file}" for file in ("card.json", "map.parquet")),
+        f"episodes/{BAND}/plain/1/signals.parquet",
+        *(f"{step}/{PAIR}.parquet" for step in ("evaluations", "trials")),
+        *(f"{step}/{PAIR}.json" for step in ("clusters", "theta")),
+        *(f"policies/{PAIR}/{file}" for file in ("card.json", "map.parquet")),
     ):
         away = (root / "data" / name).rename(root / "away")
         with pytest.raises(NotMade, match=f"{re.escape(name)}: missing"):
@@ -111,4 +111,4 @@ def test_names_the_input_that_is_missing(root, params) -> None:
         assert not (root / "reports").exists()
         away.rename(root / "data" / name)
     with pytest.raises(NotMade, match=f"floor/{BAND}.json: missing"):
-        writing.write(with_(params, "run", rig=(BAND,)), root)
+        writing.write(with_(params, "run", floors=(BAND,)), root)

@@ -6,10 +6,10 @@ from pipeline.report.landscape import Landscape
 from pipeline.report.replay import MethodReplay
 
 
-def toy_replay(params, band, method, episode, theta) -> MethodReplay:
+def toy_replay(params, pair, episode, theta, layout) -> MethodReplay:
     return MethodReplay(0.9 * episode.force, np.full(len(episode.clouds), 0.01))
 
 
-def toy_landscape(params, result, episode) -> Landscape:
+def toy_landscape(params, result, episode, clamps) -> Landscape:
     place = np.linspace(0, 1, 5)
     return Landscape(place, place, 1 + np.add.outer(place, place**2))

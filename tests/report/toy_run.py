@@ -7,22 +7,24 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sling2sim2real.base.layout import Layout
+from pipeline.layout import Layout
 from sling2sim2real.identification.searches.regions import Region, save_regions
-from sling2sim2real.launching.trials.measured import Measured, save_scores
-from sling2sim2real.settings import Params
+from sling2sim2real.launching.launches_file import COLUMNS, MORE
+from sling2sim2real.settings import Params, load
 from sling2sim2real.settings.identification import LAWS
+from sling2sim2real.settings.run import RunParams
 from sling2sim2real.simulator.parameters import THETA as NAMES
 from tests.project import with_
-from tests.report.conftest import BAND, METHOD, THETA, confidence
+from tests.report.conftest import BAND, METHOD, PAIR, THETA, confidence
 from tests.report.conftest import launches as mixed
 from tests.report.toy_launches import floor, launches
+from validation.projects import run_of as all_of
 
-OURS = "least_squares"
+OURS = "posterior"
 METHODS = OURS, METHOD, "real2sim2real", "package_si"
 ABLATIONS = "de", "no_work"
 RIG = "band1", "band2"
-DIP = "band1_dip"
+DIPS = "band1-dips"
 
 NEAR = [[0.01, 0.03], [-0.02, 0.02], [0.04, -0.04]]
 FAR = [[0.1, 0.1], [0.15, 0.15], [0.28, 0.28]]
@@ -69,43 +71,47 @@ RUBBER = dict(zip(LAWS["rubber"], (-0.25, 0.0, 0.2, 0.05, 0.1, 2.0), strict=True
 
 def run_of(params: Params) -> Params:
     """Parameters of the run, made of those of BAND and METHOD alone."""
-    bands = dict.fromkeys((*RIG, DIP), with_(params.bands[BAND], "", source="rig"))
-    params = with_(params, "", bands={**bands, BAND: params.bands[BAND]})
-    params = with_(params, "run", bands=(*RIG, BAND), rig=RIG, methods=METHODS, dips=(DIP,))
-    return with_(params, "run.ablations", bands=("band1",), methods=ABLATIONS)
+    bands = dict.fromkeys(RIG, with_(params.bands[BAND], "", source="rig"))
+    methods = {"band1": [*METHODS, *ABLATIONS], "band2": METHODS, BAND: METHODS, DIPS: [OURS]}
+    run = all_of(methods)["run"] | {"floors": [*RIG]}
+    run["rig"] = {key: run["recordings"][key] for key in (*RIG, DIPS)}
+    run = RunParams.model_validate(run)
+    return with_(params, "", bands={**bands, BAND: params.bands[BAND]}, run=run)
 
 
 def write_run(root: Path) -> None:
     """Write the run's files beside those of BAND and METHOD, which are there."""
     layout = Layout(root)
+    pairs = run_of(load(root / "params.yaml")).run.pairs
     for band, methods in LAUNCHES.items():
         if band != BAND:
-            for file in (root / "data").glob(f"*/{BAND}"):
-                shutil.copytree(file, file.with_name(band))
+            shutil.copytree(root / "data/episodes" / BAND, root / "data/episodes" / band)
+            shutil.copy(layout.launches(BAND), layout.launches(band))
         for method, trials in methods.items():
-            _copy(root, band, method)
-            trials.assign(band=band, method=method).to_parquet(layout.trials(band, method))
-            layout.theta(band, method).write_text(json.dumps(theta(band, method)))
+            pair = pairs[f"{band}-{method}"]
+            if pair.key != PAIR:
+                _copy(root, pair.key)
+            trials.assign(band=band, method=method).to_parquet(layout.trials(pair))
+            layout.theta(pair).write_text(json.dumps(theta(band, method)))
     regions = [Region(np.full(5, 0.4), 0.01 * np.eye(5), total, [2, 0]) for total in (2.0, 2.5)]
-    save_regions(layout.clusters("band2", METHOD), NAMES, regions, 5)
-    card = json.loads((layout.policy("band2", OURS) / "card.json").read_text())
+    save_regions(layout.clusters(pairs[f"band2-{METHOD}"]), NAMES, regions, 5)
+    file = layout.policy(pairs[f"band2-{OURS}"]) / "card.json"
+    card = json.loads(file.read_text())
     card["training"] |= {"converged": False, "failed_targets": 2}
-    (layout.policy("band2", OURS) / "card.json").write_text(json.dumps(card))
-    stranger = Measured(draw=(-0.3, -0.2), landing=1.9, target=1.9, method="bo")
-    save_scores(layout.scores(BAND), [stranger])
-    layout.trials(DIP, OURS).parent.mkdir()
-    launches([[0.01, -0.01]] * 3).to_parquet(layout.trials(DIP, OURS))
+    file.write_text(json.dumps(card))
+    text = f"{','.join((*COLUMNS, *MORE))}\n-0.3,-0.2,,1.9,check,1.9,bo\n"
+    layout.launches(BAND).write_text(text)
+    launches([[0.01, -0.01]] * 3).to_parquet(layout.trials(pairs[f"{DIPS}-{OURS}"]))
     layout.floor("band1").parent.mkdir()
     for band, mean in (("band1", 0.01), ("band2", None)):
         layout.floor(band).write_text(json.dumps({"band": band} | floor(mean)))
 
 
-def _copy(root: Path, band: str, method: str) -> None:
-    """Everything of METHOD on a band, as of another method."""
-    for file in (root / "data").glob(f"*/{band}/{METHOD}*"):
-        copy = file.with_name(file.name.replace(METHOD, method))
-        if method != METHOD:
-            (shutil.copytree if file.is_dir() else shutil.copy)(file, copy)
+def _copy(root: Path, key: str) -> None:
+    """Everything of the pair that is there, as of another one."""
+    for file in (root / "data").glob(f"*/{PAIR}*"):
+        copy = file.with_name(file.name.replace(PAIR, key))
+        (shutil.copytree if file.is_dir() else shutil.copy)(file, copy)
 
 
 def theta(band: str, method: str) -> dict:

@@ -19,7 +19,7 @@ from tests.project import with_
 from validation.projects import ROUGH
 from validation.synthetic import own_law_episode, visible
 
-METHOD = "sling2sim2real"
+METHOD = "paper"
 TRUTH = Parameters.of("neo_hookean", [2.5e5, 0.45, 4e-3, 0.7, 0.6])
 
 

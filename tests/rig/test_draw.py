@@ -7,10 +7,10 @@ from dataclasses import asdict
 import pytest
 from pydantic import ValidationError
 
-from rig.draw import OF_LAUNCHES, sampled
+from rig.physics.draw import sampled
 from sling2sim2real.identification.posterior.likelihood import Tolerances
 from sling2sim2real.settings import Params
-from sling2sim2real.settings.identification import LEAST_SQUARES
+from sling2sim2real.settings.identification import POSTERIOR
 from tests.project import with_
 
 
@@ -26,8 +26,6 @@ def test_each_recording_has_its_own_within_the_ranges(params: Params) -> None:
     worlds = [sampled(params, "band1"), sampled(params, "band2")]
     worlds.append(sampled(with_(params, "rig", seed=params.rig.seed + 1), "band1"))
     for key, (low, high) in params.rig.draws.items():
-        if key in OF_LAUNCHES:
-            continue
         values = [value_of(world, key) for world in worlds]
         assert len({*values}) == 3, key
         assert all(low <= value <= high for value in values), key
@@ -35,12 +33,20 @@ def test_each_recording_has_its_own_within_the_ranges(params: Params) -> None:
     assert all(value_of(again, key) == value_of(worlds[0], key) for key in params.rig.draws)
 
 
+def test_another_recording_of_a_band_has_other_numbers(params: Params) -> None:
+    """Those that `rig.recordings.<name>.stream` tells from others; launches are of the rubber."""
+    streams = [recording.stream for recording in params.rig.recordings.values()]
+    worlds = [sampled(params, f"band1{stream}") for stream in streams]
+    assert len({value_of(world, "pads.force") for world in worlds}) == len(streams) == 2
+
+
 def test_launches_and_recordings_share_no_draw(params: Params) -> None:
     recording, launching = sampled(params, "band1"), sampled(params, "band1", launching=True)
-    for key in params.rig.draws:
-        same = value_of(recording, key) == value_of(params, key)
-        assert same == (key in OF_LAUNCHES)
-        assert (value_of(launching, key) != value_of(params, key)) == (key in OF_LAUNCHES)
+    assert not params.rig.draws.keys() & params.rig.launch_draws.keys()
+    for key in (*params.rig.draws, *params.rig.launch_draws):
+        of_launches = key in params.rig.launch_draws
+        assert (value_of(recording, key) != value_of(params, key)) != of_launches
+        assert (value_of(launching, key) != value_of(params, key)) == of_launches
 
 
 @pytest.mark.parametrize("key", ["pads", "pads.colour", "nothing"])
@@ -62,7 +68,7 @@ ASSUMED = {  # of the identification and the lab, and the rig's number that it s
 
 
 def test_no_assumption_of_the_identification_is_the_rigs_number(params: Params) -> None:
-    assumed = asdict(Tolerances()) | params.methods[LEAST_SQUARES].fixed | dict(params.setup)
+    assumed = asdict(Tolerances()) | params.methods[POSTERIOR].fixed | dict(params.setup)
     for name, key in ASSUMED.items():
         hidden = value_of(params, key), value_of(sampled(params, "band1"), key)
         assert assumed[name] not in (*hidden, *params.rig.draws[key]), name

@@ -34,7 +34,7 @@ def test_an_episode_and_its_loss_are_made_without_the_world(coarse, recorded) ->
     band = blind.bands["band1"]
     episode = build_episodes(recorded[0], "band1", blind)[0][0]
     sling = ClampedBand.of(band, blind.setup, blind.sling)
-    EpisodeLoss.of(blind, "sling2sim2real", episode, sling)
+    EpisodeLoss.of(blind, "paper", episode, sling)
 
 
 def test_stages_depend_on_the_world_where_they_may() -> None:

@@ -161,18 +161,15 @@ def rough(params: Params) -> Params:
 
 @pytest.mark.slow
 def test_a_pull_with_dips_is_longer_and_another(params, tmp_path, monkeypatch) -> None:
-    """By `rig.pull`, or by the band's own; what is not pulled so does not depend on the dips."""
+    """What is not pulled so does not depend on the dips."""
     world = with_(rough(params), "plan", dips=DIPS)
     laboratory = Laboratory(tmp_path / "band1.mcap", monkeypatch)
-    plain, dipped = laboratory(world), laboratory(with_(world, "rig", pull="informative"))
+    plain = laboratory(world)
+    recordings = {"plain": world.rig.recordings["plain"].model_copy(update={"pull": "informative"})}
+    dipped = laboratory(with_(world, "rig", recordings=recordings))
     assert {topic for topic in plain if plain[topic] != dipped[topic]} == EVERYTHING
     assert len(dipped[WRENCH]) == len(plain[WRENCH]) + 20  # 0.2 s
-    band = world.rig.bands["band1"]
-    its = {"band1": band.model_copy(update={"pull": "informative"})}
-    assert laboratory(with_(world, "rig", bands=its)) == dipped
     assert laboratory(with_(world, "plan", dips=())) == plain
-    its = {"band1": band.model_copy(update={"pull": "paper"})}
-    assert laboratory(with_(world, "rig", bands=its, pull="informative")) == plain
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import copy
 from pathlib import Path
 
 import pytest
+from dvc.utils.hydra import apply_overrides
 from hypothesis import given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
@@ -12,8 +13,9 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.schema import Section
 from sling2sim2real.settings import Params, check, load, parse
 from sling2sim2real.settings.identification import LAWS
+from sling2sim2real.settings.run import UNIONS
 from sling2sim2real.simulator.parameters import THETA
-from tests.project import DEFAULTS, set_methods
+from tests.project import BAND, DEFAULTS
 
 TEXT = DEFAULTS.read_text(encoding="utf-8")
 CONTENT = YAML(typ="safe").load(TEXT)
@@ -83,7 +85,10 @@ def test_every_number_has_a_range_and_a_type() -> None:
 
 
 def test_every_text_refuses_a_number() -> None:
-    for path in (path for path, value in leaves(CONTENT) if isinstance(value, str)):
+    texts = [path for path, value in leaves(CONTENT) if isinstance(value, str)]
+    for path in texts:
+        if path[1] in ("recordings", *UNIONS):
+            continue  # as where it comes from
         message = refusal(changed(path, 3))
         assert message.startswith(f"params.yaml: {'.'.join(map(str, path))}: "), message
 
@@ -100,7 +105,9 @@ def test_no_model_has_a_default() -> None:
     assert len(ours) > 30
     for model in ours:
         optional = {name for name, field in model.model_fields.items() if not field.is_required()}
-        assert optional <= {"preconditioned", "form"}, model  # new, and softens by energy
+        assert optional <= {"preconditioned", "form", "search"}, (
+            model
+        )  # new; softens by energy; none
 
 
 def test_a_rigs_law_has_constants_of_its_own() -> None:
@@ -127,30 +134,38 @@ def test_exact_lines() -> None:
     assert missing == "params.yaml: optimizer.k_top: is missing"
 
 
+RED = {"band": "band1", "recording": "red"}
+SEARCH = CONTENT["run"]["search"]["band1-bo"]
+NEW = {"band": "band9", "recording": "plain", "method": "posterior"}
 DIP = {"at": 1.0, "depth": 0.1, "out_time": 1.0, "back_time": 1.0}
 REFUSED = [
-    ("run.rig", [], "run.rig: must list"),
-    ("run.bands", ["band1", "other"], "run.bands: other is not one of band1"),
-    ("run.bands", ["band1", "band1"], "run.bands: lists an entry twice"),
-    ("run.bands", [], "run.bands: must not be empty"),
-    ("run.methods", ["best"], "run.methods: best is not one of"),
-    ("run.ablations.methods", ["sling2sim2real"], "ablations.methods: sling2sim2real is one"),
-    ("run.ablations.bands", ["other"], "run.ablations.bands: other is not one of run.bands"),
+    ("run.main", "paper", "run: pairs: lacks band1-dips-paper: the card of a recording is by"),
+    ("run.floors", ["band1", "band1"], "run.floors: lists an entry twice"),
+    ("run.floors", ["band9"], "run.floors: band9 is no band of the rig"),
+    ("run.recordings", {}, "run.recordings: must not be empty"),
+    ("run.recordings.band1-red", RED, "pairs: lacks band1-red-posterior: the card of a rec"),
+    ("run.recordings.red", RED | {"band": "red", "recording": "plain"}, "pairs: lacks red-post"),
+    ("run.rig.green", {"band": "green", "recording": "plain"}, "run: recordings: must hold `rig`"),
+    ("run.rig.band1.recording", "dips", "run: rig.band1: must be called band1-dips, by what it"),
+    ("run.search.x", SEARCH, "run: search.x: must be called band1-bo, by what it is of"),
+    ("run.pairs", {}, "run: pairs: must be {<<: [*multistart, *posterior, *search]}"),
+    ("run.search", {}, "run: pairs: must be {<<: [*multistart, *posterior, *search]}"),
+    (
+        "run.posterior.band9-posterior",
+        NEW,
+        "run: explored: must be {<<: [*multistart, *posterior]}",
+    ),
+    ("rig.recordings", {}, "rig.recordings: lacks plain, which the rig is to record"),
+    ("rig.recordings.dips.pull", "long", "rig.recordings.dips.pull: must be 'paper' or 'info"),
     ("rig.bands", {}, "rig.bands: lacks band1"),
     ("rig.bands.band1.law", "mooney", "rig.bands.band1.law: must be 'ogden'"),
     ("rig.bands.band1.constants", [0.4, 2.0, 0.1], "rig.bands.band1: constants: ogden has pairs"),
     ("rig.bands.band1.spectrum", {"weight": 0.1}, "rig.bands.band1.spectrum.times: is missing"),
-    ("rig.bands.band1_dip.like", "band9", "rig: bands.band1_dip.like: band9 is not one of band1"),
-    ("rig.bands.band1_dip.like", "band2_dip", "band2_dip is itself like band2: name that"),
-    ("rig.bands.band1_dip.viscosity", 0.1, "has the rubber of band1: leave out viscosity"),
-    ("rig.bands.band1_dip.pull", "long", "rig.bands.band1_dip.pull: must be 'paper' or 'info"),
     (
         "plan.dips",
         [DIP | {"deep": 1}],
         "plan.dips.0.deep: unknown key, the closest known one is dep",
     ),
-    ("bands.band1_dip.mass", 0.1, "bands.band1_dip.mass: must be that of band1, which rig.bands"),
-    ("run.dips", ["band1"], "run: dips: band1 is one of run.bands already"),
     ("bands", {"band-1": CONTENT["bands"]["band1"]}, "bands.band-1: a name has"),
     ("bands.band1.source", "bag", "bands.band1.source: must be 'recording' or 'rig'"),
     ("parameters.youngs_modulus.low", 1e8, "parameters.youngs_modulus: low must be less"),
@@ -168,20 +183,18 @@ REFUSED = [
     ("episode.tail", 59.0, "episode: tail must be less"),
     ("episode.longest", 8.0, "episode: longest must be at least duration"),
     ("trials.targets", [0.5], "trials.targets: 0.5 lies outside policy.targets"),
-    ("bands", {"measured": CONTENT["bands"]["band1"]}, "bands.measured: data/trials/measured"),
     ("bands.band1.rest_length", 0.2, "bands.band1.rest_length: 0.2 must be longer than setup."),
     ("policy.hidden", [], "policy.hidden: must not be empty"),
     ("loss", 3, "loss: must be a mapping"),
     ("weather", 3, "weather: unknown key"),
     ("methods.de.weights", NOTHING, "methods.de.weights: at least one weight"),
-    ("methods.de.search", "cmaes", "methods.de.search: must be multistart, least_squares, de"),
+    ("methods.de.search", "cmaes", "methods.de.search: must be multistart, posterior, de"),
     ("methods.de.search", "my.module:", "or package.module:function, got 'my.module:'"),
     ("methods.no_work.settings", {"rate": 1}, "methods.no_work: settings are for another"),
     ("methods.de.settings", {"seed": 3}, "methods.de: settings: seed stands under `optimizer`"),
     ("methods.de", CONTENT["methods"]["de"] | NARROW, "must be between 0.45 and 0.49, got 0.4"),
-    ("methods.least_squares.fixed", {}, "wants `fixed` to name poissons_ratio, dynamic_friction"),
+    ("methods.posterior.fixed", {}, "wants `fixed` to name poissons_ratio, dynamic_friction"),
     ("setup.tool", {"weight": 0.7}, "setup.tool.weight: unknown key, the closest known one is"),
-    ("run.own", ["band1"], "own: band1 is one of run.bands already"),
     ("methods.de.bounds", {"air_drag": [0.0, 1.0]}, "air_drag is not one of youngs_modulus"),
     ("methods.de.bounds", {"poissons_ratio": [0.2, 0.4]}, "[low, high] within parameters.poissons"),
     ("methods.de.settings", {"rate": [1]}, "methods.de.settings.rate: must be a number, true"),
@@ -202,54 +215,60 @@ def test_what_is_refused_and_how_it_is_said() -> None:
         assert expected in message
 
 
-def test_bands_of_ones_own_are_recorded_and_have_a_list() -> None:
-    content = changed(("run", "own"), ["band3"])
-    for key in ("bands", "rig"):
-        content["run"][key] = ["band1", "band2"]
-    assert refusal(content) == (
-        "params.yaml: run.own: band3 has source: rig, so it belongs under run.bands"
-    )
-    content["bands"]["band3"]["source"] = "recording"
-    assert check(content).run.own == ("band3",)
-    content["run"]["own"], content["run"]["dips"] = [], ["band3"]
-    assert "run.dips: band3 has source: recording: put it under run.own" in refusal(content)
-    del content["run"]["own"]
-    assert "run.own: is missing" in refusal(content)
+ORANGE = {"band": "orange", "recording": "plain"}
+
+
+def test_a_recording_of_ones_own_needs_its_pair_by_the_main_method() -> None:
+    content = copy.deepcopy(CONTENT)
+    content["bands"]["orange"] = BAND
+    content["run"]["recordings"]["orange"] = ORANGE
+    assert "pairs: lacks orange-posterior" in refusal(content)
+    pair = {"orange-posterior": ORANGE | {"method": "posterior"}}
+    for kind in ("posterior", "explored", "pairs"):
+        content["run"][kind] |= pair
+    run = check(content).run
+    assert run.first["orange"].key == "orange" and run.pairs["orange-posterior"].search is None
+    content["bands"]["orange"] = BAND | {"source": "rig"}
+    assert "run.rig: wants orange, whose band has source: rig" in refusal(content)
+    content["bands"]["orange"], content["run"]["rig"]["orange"] = BAND, ORANGE
+    assert "run.recordings alone: wants orange, whose band has source: rec" in refusal(content)
+
+
+def test_a_pair_stands_under_what_its_method_searches_with() -> None:
+    for change, expected in (
+        ({"search": "multistart"}, "run.search: band1-de belongs under run.multistart, for method"),
+        ({"search": "bo"}, "run.search.band1-de.search: must be bo: whose code it runs"),
+        ({"search": "my.search:Own"}, "run.search.band1-de.search: must be own: whose code it"),
+    ):
+        assert expected in refusal(changed(("methods", "de"), CONTENT["methods"]["de"] | change))
+
+
+def test_one_entry_runs_all_its_stages(tmp_path: Path) -> None:
+    """By `dvc exp run -S`: YAML's merges take it up in the unions, and no other line moves."""
+    path = tmp_path / "params.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    pair = "{band: band2, recording: plain, method: de, search: de}"
+    apply_overrides(path, [f"+run.search.band2-de={pair}"])
+    assert load(path).run.pairs["band2-de"].method == "de"
+    lines = "band: band2", "recording: plain", "method: de", "search: de"
+    new = "".join(["    band2-de:\n", *(f"      {line}\n" for line in lines)])
+    assert path.read_text(encoding="utf-8").replace(new, "", 1) == TEXT
 
 
 def test_what_a_method_leaves_out_is_as_the_defaults_say() -> None:
     weights = CONTENT["methods"]["de"]["weights"]
-    method = check(stepped(changed(("methods", "de"), {"weights": weights}))).methods["de"]
+    method = check(changed(("methods", "new"), {"weights": weights})).methods["new"]
     assert (method.search, method.k_top, method.covariance) == ("multistart", None, True)
     assert (method.settings, method.fixed, method.bounds) == ({}, {}, {})
     other = check(changed(("method_defaults", "bounds"), {"poissons_ratio": [0.4, 0.49]})).methods
     assert other["no_work"].bounds == {"poissons_ratio": (0.4, 0.49)}
-    assert set(other["least_squares"].bounds) == {*LAWS["rubber"]}
+    assert set(other["posterior"].bounds) == {*LAWS["rubber"]}
     without = {key: value for key, value in CONTENT.items() if key != "method_defaults"}
     assert refusal(without) == "params.yaml: method_defaults: is missing"
     assert refusal(changed(("method_defaults", "k_top"), 0)).startswith(
         "params.yaml: method_defaults.k_top: must be between 1 and 50"
     )
     assert "methods.de: must be a mapping" in refusal(changed(("methods", "de"), 3))
-
-
-def stepped(content: dict) -> dict:
-    """The same with `run.steps` as its methods' searches have them."""
-    run = content["run"]
-    set_methods(content, run["methods"], run["ablations"]["methods"])
-    return content
-
-
-def test_the_steps_of_a_run_are_those_of_its_methods_searches() -> None:
-    assert stepped(changed(("trials", "repeats"), 3))["run"] == CONTENT["run"]
-    assert refusal(changed(("run", "steps", "clusters"), [])) == (
-        "params.yaml: run.steps.clusters: must list those of run.methods whose search has this"
-        " step: [sling2sim2real]"
-    )
-    output = refusal(changed(("methods", "de"), CONTENT["methods"]["bo"]))
-    assert "run.ablations.steps.de: must list those of run.ablations.methods" in output
-    output = refusal(changed(("run", "ablations", "rig"), []))
-    assert "run.ablations.rig: must list those of run.ablations.bands" in output
 
 
 def test_a_methods_regions_need_rollouts() -> None:
@@ -261,9 +280,9 @@ def test_a_methods_regions_need_rollouts() -> None:
 def test_what_a_method_may_ask_for() -> None:
     base = CONTENT["methods"]["de"]
     section = {"search": "lab.search:Own", "settings": {"rate": 0.1, "steps": 3, "name": "x"}}
-    whole = stepped(changed(("methods", "de"), base | section))
-    assert check(whole).methods["de"].settings["rate"] == 0.1
-    rubber = {"law": "rubber", "bounds": CONTENT["methods"]["least_squares"]["bounds"]}
+    whole = changed(("methods", "new"), base | section)
+    assert check(whole).methods["new"].settings["rate"] == 0.1
+    rubber = {"law": "rubber", "bounds": CONTENT["methods"]["posterior"]["bounds"]}
     rubber |= {"fixed": ALL_FIXED | {"softening": 0.0}}  # the rest of what the law adds is left
     assert len(check(changed(("methods", "de"), base | rubber)).methods["de"].fixed) == 6
 

@@ -2,7 +2,6 @@
 
 import json
 
-import pytest
 from ruamel.yaml import YAML
 
 from sling2sim2real.settings.provenance import (
@@ -14,13 +13,13 @@ from sling2sim2real.settings.provenance import (
 )
 from tests.project import ROOT
 
-BAND, METHOD = "band1", "least_squares"
+BAND, METHOD = "band1", "posterior"
 
 
 def test_settings_are_values_by_their_keys_and_survive_json(params) -> None:
     values = settings_of(params, BAND, METHOD)
     assert values["setup.fork_width"] == 0.275 and values["bands.band1.mass"] == 0.023
-    assert values["methods.least_squares.law"] == params.methods[METHOD].law
+    assert values["methods.posterior.law"] == params.methods[METHOD].law
     for settings in (values, policy_settings_of(params, BAND)):
         assert changes(json.loads(json.dumps(settings)), settings) == []
 
@@ -41,16 +40,8 @@ def test_launches_as_evidence_bring_their_settings(params) -> None:
     assert "setup.arm_stiffness" in more and "trials.actuation_error" in more
 
 
-@pytest.mark.parametrize("step", ["theta", "policy"])
-def test_dvc_runs_a_stage_again_when_what_it_notes_has_changed(params, step: str) -> None:
-    """Else its file would go on naming a change that `dvc repro` does not mend."""
-    listed = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"][step]["params"]
-    names = {"${item.band}": BAND, "${item.method}": METHOD}
-    for mark, name in names.items():
-        listed = [key.replace(mark, name) for key in listed]
-    noted = (
-        settings_of(params, BAND, METHOD) if step == "theta" else policy_settings_of(params, BAND)
-    )
-    assert [
-        key for key in noted if not any(f"{key}.".startswith(f"{prefix}.") for prefix in listed)
-    ] == []
+def test_dvc_trains_a_policy_again_when_what_it_notes_has_changed(params) -> None:
+    listed = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]["policy"]["do"]["params"]
+    listed = [key.replace("${item.band}", BAND) for key in listed]
+    noted = policy_settings_of(params, BAND)
+    assert [key for key in noted if not any(f"{key}.".startswith(f"{p}.") for p in listed)] == []

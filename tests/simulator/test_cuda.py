@@ -21,7 +21,7 @@ pytestmark = pytest.mark.skipif(not gpus(), reason="no CUDA device on this machi
 
 
 RUBBER = {"mooney_share": 0.3, "relaxation": 0.02, "flow": 0.2, "log_flow_rate": 3.0}
-LAWS = {"neo_hookean": {}, "rubber": RUBBER}
+LAWS = {"neo_hookean": {}, "rubber": RUBBER, "corotated": {}}
 
 
 @pytest.mark.parametrize("law", LAWS)

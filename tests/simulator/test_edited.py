@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from sling2sim2real.base.layout import Layout
 from sling2sim2real.identification.results.mounting import load_sling
 from sling2sim2real.identification.results.theta import load_samples
 from sling2sim2real.settings import load
@@ -13,9 +12,9 @@ from tests.report.conftest import posterior
 
 
 def test_the_calibration_of_clamps(tmp_path: Path) -> None:
-    params, path = load(DEFAULTS), Layout(tmp_path).clamps("band1")
+    params, path = load(DEFAULTS), tmp_path / "clamps.json"
     content = {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}
-    read, refused = outcomes(path, content, lambda: load_sling(params, "band1", tmp_path))
+    read, refused = outcomes(path, content, lambda: load_sling(params, "band1", path))
     assert refused > 20 and read == 1  # with a key that nobody knows
 
 

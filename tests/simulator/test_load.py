@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from sling2sim2real.base.files import write_json
-from sling2sim2real.base.layout import Layout
 from sling2sim2real.identification.results.mounting import load_sling, sling_of_method
 from sling2sim2real.identification.results.theta import calibrated, launch_setup, load_theta
 from sling2sim2real.settings import load
@@ -19,32 +18,32 @@ VALUES = dict(zip(THETA, (2.5e5, 0.45, 3e-3, 0.7, 0.6), strict=True))
 
 
 @pytest.fixture
-def root(tmp_path: Path) -> Path:
-    write_json(Layout(tmp_path).clamps("band1"), SHOWN)
-    return tmp_path
+def clamps(tmp_path: Path) -> Path:
+    write_json(tmp_path / "clamps.json", SHOWN)
+    return tmp_path / "clamps.json"
 
 
 def mounting_of(sling) -> tuple:
     return sling.clamp_direction.tolist(), sling.flexural_rigidity
 
 
-def test_a_method_takes_what_the_recording_showed_or_leaves_it_out(root: Path) -> None:
-    method = PARAMS.methods["sling2sim2real"]
+def test_a_method_takes_what_the_recording_showed_or_leaves_it_out(clamps: Path) -> None:
+    method = PARAMS.methods["paper"]
     methods = {"with": method, "without": method.model_copy(update={"mounting": False})}
     params = PARAMS.model_copy(update={"methods": methods})
-    assert mounting_of(sling_of_method(params, "band1", "with", root)) == tuple(SHOWN.values())
+    assert mounting_of(sling_of_method(params, "band1", "with", clamps)) == tuple(SHOWN.values())
     as_setup = (list(PARAMS.setup.clamp_direction), None)
-    assert mounting_of(sling_of_method(params, "band1", "without", root)) == as_setup
-    assert mounting_of(load_sling(PARAMS, "band1", "nowhere")) == as_setup
+    assert mounting_of(sling_of_method(params, "band1", "without", clamps)) == as_setup
+    assert mounting_of(load_sling(PARAMS, "band1", Path("nowhere"))) == as_setup
 
 
-def test_a_theta_file_says_so_and_its_launches_land_elsewhere(root: Path) -> None:
+def test_a_theta_file_says_so_and_its_launches_land_elsewhere(clamps: Path) -> None:
     content = {"band": "band1", "theta": VALUES}
     landings, setup = [], launch_setup(PARAMS, content)
     for mounted in ({}, {"mounted": True}, {"mounted": False}):
-        path = root / "theta.json"
+        path = clamps.with_name("theta.json")
         write_json(path, content | mounted)
-        sling = calibrated(PARAMS, "band1", load_theta(path, "band1"), root)
+        sling = calibrated(PARAMS, "band1", load_theta(path, "band1"), clamps)
         assert (sling.flexural_rigidity is None) == (mounted == {"mounted": False})
         landings.append(
             launch(

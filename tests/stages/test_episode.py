@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.layout import Layout
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.layout import Layout, NotMade
-from sling2sim2real.identification.objective.session import load_episodes
+from sling2sim2real.base.layout import NotMade
+from sling2sim2real.episode.episode import Episode
 from stages import episode
-from tests.project import with_
 from tests.recording.conftest import blind, params, seen
 from tests.recording.parts import joined, split
 
@@ -21,24 +21,29 @@ __all__ = ["blind", "params", "seen"]
 def folder(tmp_path: Path, params, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Of band1's recordings, in an empty project."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(episode, "started", lambda *_: (params, "band1"))
-    return Layout().raw("band1")
+    recording = params.run.recordings["band1"]
+    monkeypatch.setattr(episode, "recording_of_stage", lambda: (params, recording))
+    return Layout().raw(recording)
+
+
+def saved() -> list[Episode]:
+    return Episode.load_all(Path("data/episodes/band1/plain"))
 
 
 def test_each_pull_of_each_file_becomes_an_episode_in_order(folder, seen, blind, capsys) -> None:
     folder.mkdir(parents=True)
     shutil.copy(seen[0], folder / "b.mcap")
     joined(folder / "a.mcap", [blind[0], seen[0]])
-    left = Layout().episode("band1", 3)  # by an earlier run
+    left = Path("data/episodes/band1/plain/3")  # by an earlier run
     left.mkdir(parents=True)
     episode.main()
-    inputs = [saved.metadata["input"] for saved in load_episodes("band1")]
+    inputs = [made.metadata["input"] for made in saved()]
     pulls = [(source["file"], source["pull"]) for source in inputs]
     assert pulls == [("a.mcap", 2), ("b.mcap", 1)]
     assert not left.exists()
     message = capsys.readouterr()
     assert message.err.startswith(
-        "warning: left out: data/raw/band1/a.mcap: pull 1 of 2: empty mask"
+        "warning: left out: data/raw/band1/plain/a.mcap: pull 1 of 2: empty mask"
     )
     assert message.err.count("\n") == 1 and message.out.count("peak force") == 2
 
@@ -49,7 +54,7 @@ def test_a_split_bag_becomes_one_episode(folder, seen) -> None:
     split(seen[0], folder, (1.5,), "c")
     shutil.copy(seen[0], folder / "a.mcap")
     episode.main()
-    whole, *parts = load_episodes("band1")
+    whole, *parts = saved()
     assert [part.metadata["input"]["file"] for part in parts] == ["b", "c_0.mcap"]
     for part in parts:
         np.testing.assert_array_equal(part.force, whole.force)
@@ -62,17 +67,13 @@ def test_a_file_without_a_pull_that_can_be_used_leaves_the_episodes_alone(
     folder.mkdir(parents=True)
     shutil.copy(seen[0], folder / "a.mcap")
     episode.main()
-    before = Layout().episode("band1").stat().st_ino
+    before = Path("data/episodes/band1/plain/1").stat().st_ino
     shutil.copy(blind[0], folder / "b.mcap")
     with pytest.raises(UserError, match="b.mcap: empty mask"):
         episode.main()
-    assert Layout().episode("band1").stat().st_ino == before
+    assert Path("data/episodes/band1/plain/1").stat().st_ino == before
 
 
-def test_a_band_without_a_recording_says_who_makes_one(folder, params, monkeypatch) -> None:
-    with pytest.raises(NotMade, match="data/raw/band1/band1.mcap: missing"):
-        episode.main()
-    changed = with_(params, "bands.band1", source="recording")
-    monkeypatch.setattr(episode, "started", lambda *_: (changed, "band1"))
-    with pytest.raises(UserError, match="sling add-recording --band band1 FILE.mcap` puts one"):
+def test_a_recording_without_files_is_missing(folder) -> None:
+    with pytest.raises(NotMade, match="data/raw/band1/plain/band1.mcap: missing"):
         episode.main()

@@ -21,9 +21,8 @@ from stages.start import remedy
 from tests.project import DEFAULTS, ROOT, alive, python, until
 from validation.projects import environment
 
-OF_A_BAND = ("record", "episode", "clamps")
-OF_A_SEARCH = ("history", "clusters", "cma", "density", "search")
-OF_A_METHOD = (*OF_A_SEARCH, "theta", "policy", "launches", "trials", "card")
+OF_A_RECORDING = ("record", "episode", "clamps", "card")
+OF_A_PAIR = ("history", "clusters", "cma", "posterior", "search", "theta", "policy", "trials")
 
 
 @pytest.fixture
@@ -44,8 +43,12 @@ def stage(tmp_path: Path, monkeypatch, capsys) -> Callable[..., tuple[int, str]]
 
 
 def test_wrong_arguments_are_answered_by_the_usage(stage) -> None:
-    of_a_band = (*OF_A_BAND, "evidence", "floor")
-    for words, names in ((" BAND", of_a_band), (" BAND METHOD", OF_A_METHOD), ("", ["report"])):
+    for words, names in (
+        (" RECORDING", OF_A_RECORDING),
+        (" RECORDING-METHOD", OF_A_PAIR),
+        (" BAND", ["floor"]),
+        ("", ["report"]),
+    ):
         for name in names:
             expected = (2, f"usage: python -m stages.{name}{words}")
             assert stage(name, "a", "b", "c") == expected
@@ -53,10 +56,11 @@ def test_wrong_arguments_are_answered_by_the_usage(stage) -> None:
 
 
 def test_unknown_names(stage) -> None:
-    status, line = stage("history", "band9", "sling2sim2real")
-    assert status == 1 and line.startswith("error: band band9: not in params.yaml, which has band1")
-    status, line = stage("theta", "band1", "best")
-    assert status == 1 and line.startswith("error: method best: not in params.yaml, which has")
+    status, line = stage("history", "band9-paper")
+    assert status == 1
+    assert line.startswith("error: band9-paper: not under run.pairs in params.yaml, which has band")
+    status, line = stage("clamps", "band1-best")
+    assert status == 1 and line.startswith("error: band1-best: not under run.recordings in params")
 
 
 def test_a_history_that_failed_says_why(stage) -> None:
@@ -64,72 +68,57 @@ def test_a_history_that_failed_says_why(stage) -> None:
     unit = np.random.default_rng(1).random((30, 5))
     nothing = {term: np.full(30, np.nan) for term in TERMS}
     theta, reasons = space.to_physical(unit), ["the band slipped"] * 30
-    history = Evaluations("sling2sim2real", space.names)
+    history = Evaluations("paper", space.names)
     history.add(
         Evaluation(unit, theta, nothing, np.full(30, np.inf), reasons), phase="de", generation=0
     )
-    history.save(Path("data/history/band1/sling2sim2real.parquet"))
-    status, line = stage("clusters", "band1", "sling2sim2real")
+    history.save(Path("data/history/band1-paper.parquet"))
+    status, line = stage("clusters", "band1-paper")
     assert status == 1
-    assert line.startswith(
-        "error: sling2sim2real: each of 30 simulations failed (the band slipped)"
-    )
-
-
-def test_a_hint_names_the_group_by_which_a_method_runs(stage) -> None:
-    """`run.methods` and `run.ablations` are stages of different names; another method is none."""
-    path = Path("params.yaml")
-    run = load(path).run.ablations
-    assert "band1" in run.bands and {"de", "adam"} <= set(run.methods)
-    for method, group in (("sling2sim2real", "cma"), ("de", "ablation_de")):
-        _, line = stage("theta", "band1", method)
-        assert line.endswith(f"missing; `dvc repro {group}@band1-{method}` makes it")
-    _, line = stage("theta", "band2", "adam")
-    assert "missing; name adam under run.methods or run.ablations" in line
+    assert line.startswith("error: paper: each of 30 simulations failed (the band slipped)")
 
 
 def test_missing_inputs(stage) -> None:
-    both = "band1", "sling2sim2real"
-    for item, names in ((both[:1], OF_A_BAND[1:]), (both, OF_A_METHOD), ((), ["report"])):
+    for item, names in (
+        (["band1-dips"], OF_A_RECORDING[1:]),
+        (["band1-paper"], OF_A_PAIR),
+        ([], ["report"]),
+    ):
         for name in names:
             status, line = stage(name, *item)
             assert status == 1 and line.startswith("error: data/"), line
-            assert "missing; `dvc repro " in line or "no such file" in line, line
+            assert "missing; `dvc repro " in line, line
 
 
 def test_a_file_that_is_missing_or_damaged_says_what_makes_it(stage) -> None:
     """By its place alone: in any project's folder, and none for what no stage makes."""
     cases = {
-        "data/raw/band1/band1.mcap": "record@band1",
-        "data/episodes/band1/1/clouds.parquet": "episode@band1",
-        "data/clamps/band1.json": "clamps@band1",
+        "data/raw/band1/plain/band1.mcap": "record@band1",
+        "data/raw/band1/dips/band1-dips.mcap": "record@band1-dips",
+        "data/episodes/band1/plain/1/clouds.parquet": "episode@band1",
+        "data/clamps/band1/dips.json": "clamps@band1-dips",
         "data/floor/band1.json": "floor@band1",
-        "/data/x/data/confidence/band1/de.json": "ablation_de@band1-de",
-        "data/launches/band1/observed.json": "evidence@band1",
-        "data/policies/band1/adam/launches.parquet": "ablation_launches@band1-adam",
-        "data/policies/band2/sling2sim2real/card.json": "policy@band2-sling2sim2real",
-        **{
-            f"data/{step}/band1/de.parquet": f"ablation_{step}@band1-de"
-            for step in ("theta", "trials")
-        },
-        "data/history/band1/no_work.parquet": "ablation_history@band1-no_work",
-        "data/clusters/band2/sling2sim2real.json": "clusters@band2-sling2sim2real",
-        "data/evaluations/band2/sling2sim2real.parquet": "cma@band2-sling2sim2real",
-        "data/evaluations/band2/least_squares.parquet": "density@band2-least_squares",
-        "data/evaluations/band1/package_si.parquet": "bo@band1-package_si",
+        "/data/x/data/confidence/band1-de.json": "search@band1-de",
+        "data/policies/band2-paper/card.json": "policy@band2-paper",
+        **{f"data/{step}/band1-de.parquet": f"{step}@band1-de" for step in ("theta", "trials")},
+        "data/history/band1-no_work.parquet": "history@band1-no_work",
+        "data/clusters/band2-paper.json": "clusters@band2-paper",
+        "data/evaluations/band2-paper.parquet": "cma@band2-paper",
+        "data/evaluations/band1-dips-posterior.parquet": "posterior@band1-dips-posterior",
     }
     for path, makes in cases.items():
         assert remedy(NotMade(Path(path))) == f"`dvc repro {makes}` makes it"
         anew = f"`dvc repro --force {makes}` makes it anew"
         assert remedy(NotMade(Path(path), "damaged")) == anew
-    message = remedy(NotMade(Path("data/raw/mine/one.mcap")))
-    assert message == "`sling add-recording --band mine FILE.mcap` puts a recording there"
-    path = Path("data/policies/band1/de/card.json")
-    assert remedy(NotMade(Path("data/theta/band2/adam.json"))).startswith("name adam under run.")
-    for path in ("mine.json", "data/trials/measured/band1.csv", "data/plans/band1/a.csv", "data"):
+    assert remedy(NotMade(Path("data/raw/mine/plain/mine.mcap"))) == "put MCAP files there"
+    assert remedy(NotMade(Path("data/launches/mine.csv"))).startswith("a CSV with the header draw")
+    for path in ("theta/band2-adam.json", "floor/red.json", "plans/band1/a.csv"):
+        message = remedy(NotMade(Path("data", path)))
+        assert message.startswith("no entry of `run` in params.yaml makes "), message
+    for path in ("mine.json", "data"):
         assert remedy(NotMade(Path(path))) == ""
-    error = pickle.loads(pickle.dumps(NotMade(path, "damaged")))
-    assert (str(error), error.problem) == (f"{path}: damaged", "damaged")
+    error = pickle.loads(pickle.dumps(NotMade(Path("a.json"), "damaged")))
+    assert (str(error), error.problem) == ("a.json: damaged", "damaged")
 
 
 def test_a_stage_has_one_thread_of_blas_whatever_the_machine() -> None:

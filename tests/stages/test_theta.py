@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from sling2sim2real.api.identification import Identification
+from pipeline.layout import Layout
 from sling2sim2real.base.files import write_json
-from sling2sim2real.base.layout import Layout
 from sling2sim2real.identification.results.theta import calibrated, load_theta
 from sling2sim2real.settings import load
 from sling2sim2real.simulator.parameters import Parameters
@@ -29,22 +28,22 @@ def test_what_a_method_leaves_out_is_left_out_everywhere(
     yaml = YAML()
     content = yaml.load(DEFAULTS)
     content["optimizer"].update({**BUDGET, "cma_rollouts": 4})
-    content["methods"]["sling2sim2real"]["mounting"] = mounting
+    content["methods"]["paper"]["mounting"] = mounting
     yaml.dump(content, tmp_path / "params.yaml")
     params, layout = load(), Layout()
     sling, episode = recorded_yardstick(params)
     truth = Parameters.of(sling.law, [2e5, 0.45, 2e-3, 0.7, 0.6])
     episode = own_law_episode(sling, episode, truth, cutoff=35.0)
-    episode.save(layout.episode("band1"))
-    write_json(layout.clamps("band1"), SHOWN)
-    monkeypatch.setattr(sys, "argv", ["stage", "band1", "sling2sim2real"])
+    pair = params.run.pairs["band1-paper"]
+    episode.save(layout.episode(pair))
+    write_json(layout.clamps(pair), SHOWN)
+    monkeypatch.setattr(sys, "argv", ["stage", pair.key])
     for stage in ("history", "clusters", "cma", "theta"):
         with pytest.raises(SystemExit) as ended:
             runpy.run_module(f"stages.{stage}", run_name="__main__")
         assert not ended.value.code
-    path = layout.theta("band1", "sling2sim2real")
+    path = layout.theta(pair)
     saved = load_theta(path, "band1")
     assert json.loads(path.read_text()).get("mounted") == (None if mounting else False)
-    assert (calibrated(params, "band1", saved).flexural_rigidity == 2e-3) == mounting
-    summary = Identification.of_run("band1", "sling2sim2real")
-    assert (summary.mounting is not None) == mounting
+    sling = calibrated(params, "band1", saved, layout.clamps(pair))
+    assert (sling.flexural_rigidity == 2e-3) == mounting

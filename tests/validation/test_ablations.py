@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sling2sim2real.identification.objective.box import latin_hypercube
-from sling2sim2real.identification.searches.differential_evolution import differential_evolution
+from sling2sim2real.identification.searches.de import differential_evolution
 from sling2sim2real.settings import load
 from tests.identification.searches.functions import batches_of
 from validation.campaigns.ablations import FIRST, PAPER, Job, jobs_of, summary

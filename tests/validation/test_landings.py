@@ -39,7 +39,10 @@ def test_each_band_is_recorded_by_both_pulls_and_once_after_it_was_drawn() -> No
         assert len(virgin) == 2 * count * len(bands)
         assert len(every) - len(virgin) == 2 * len(bands) * (True in states)
     job = OneRecording(DEVELOP, "develop1", "informative", True, 0)
-    assert job.params.rig.pull == "informative" and job.params.bands["develop1"].preconditioned
+    assert (
+        job.params.rig.recordings["plain"].pull == "informative"
+        and job.params.bands["develop1"].preconditioned
+    )
 
 
 def test_one_dip_is_recorded_on_the_bands_that_a_choice_may_rest_on() -> None:
@@ -48,7 +51,7 @@ def test_one_dip_is_recorded_on_the_bands_that_a_choice_may_rest_on() -> None:
     plain = OneRecording(DEVELOP, "band1", "informative", False, 0).params.plan
     (dip,) = every[0].params.plan.dips
     assert dip.depth < min(deep.depth for deep in plain.dips) and len(plain.dips) == 3
-    assert every[0].params.rig.pull == "informative"
+    assert every[0].params.rig.recordings["plain"].pull == "informative"
 
 
 def test_half_of_the_sealed_rubbers_soften_by_laws_that_none_was_developed_on() -> None:

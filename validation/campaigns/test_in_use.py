@@ -10,7 +10,7 @@ pytestmark = pytest.mark.validation
 
 MINE = {"source": "recording", "mass": 0.0408, "diameter": 0.012, "rest_length": 0.6}
 SET = {
-    **run_of([], ["sling2sim2real"], ["bo"]),
+    **run_of([], ["paper"], ["bo"]),
     "run.bands": ["orange"],
     "run.ablations.bands": ["orange"],
     "bands": {"orange": MINE},
@@ -33,7 +33,7 @@ def test_what_a_user_sets_turns_no_test_red(tmp_path) -> None:
     copy.set(SET)
     (folder / "data/evidence/orange.csv").write_text("draw_y_m,draw_z_m,landing_y_m\n-0.4,-0.2,2\n")
     (folder / "data/theta/orange").mkdir(parents=True)
-    (folder / "data/theta/orange/least_squares.json").write_text("{}")
+    (folder / "data/theta/orange/posterior.json").write_text("{}")
     copy.commit()
     message = copy(sys.executable, "-m", "pytest", "-q", "-m", "not slow and not validation")
     assert " passed" in message and "failed" not in message

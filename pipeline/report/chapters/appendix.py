@@ -71,7 +71,7 @@ def _predictions(report: Report) -> str | None:
     if results.trials.landing_y.isna().all():
         return None
     trusted = {(result.band, result.method) for result in results if result.confidence}
-    drawing = of_kind(results.trials, *LAUNCHED), trusted, report.shown(report.params.run.methods)
+    drawing = of_kind(results.trials, *LAUNCHED), trusted, report.shown(report.results.shared)
     alt = "predicted beside actual landings"
     return report.picture("predictions", alt, landings.predictions, *drawing)
 
@@ -119,7 +119,7 @@ def _correlation(report: Report) -> str | None:
 
 def _training(report: Report) -> str:
     curves = {
-        band: {method: of_band[method].training for method in report.params.run.methods}
+        band: {method: of_band[method].training for method in report.results.shared}
         for band, of_band in report.results.methods.items()
     }
     alt = "training error by iteration"

@@ -19,8 +19,10 @@ def outcome(report: Report) -> str:
     results, params, main = report.results, report.params, report.main
     table = tables.outcome_table(results, report.references, report.styles)
     recorded = [b for b in results.methods if params.bands[b].source == "recording"]
-    trials = {band: methods[main].trials for band, methods in results.methods.items()}
-    trials |= {band: dip.trials for band, dip in results.dips.items()}
+    trials = {
+        first.key: results.methods[band][main].trials for band, first in params.run.first.items()
+    }
+    trials |= {key: other.trials for key, other in results.others.items()}
     return filled(
         Path(__file__).with_name("outcome.md.j2"),
         results=results,
@@ -31,8 +33,12 @@ def outcome(report: Report) -> str:
         campaign=results.floors and markdown(campaign_table(report.root / ABLATIONS)),
         doubts=doubts(report),
         bands=[
-            (band, params.bands[band], launched.kind.isin(LAUNCHED).any())
-            for band, launched in trials.items()
+            (
+                key,
+                params.bands[params.run.recordings[key].band],
+                launched.kind.isin(LAUNCHED).any(),
+            )
+            for key, launched in trials.items()
         ],
     )
 
@@ -42,7 +48,7 @@ def _picture(report: Report) -> str | None:
     trials = trials.loc[trials.target.notna()]
     if trials.empty:
         return None
-    shown = report.shown([m for m in report.params.run.methods if m in set(trials.method)])
+    shown = report.shown([m for m in report.results.shared if m in set(trials.method)])
     alt = "how far from its target each launch landed"
     return report.picture("landings", alt, misses, trials, report.results.least, shown)
 

@@ -12,7 +12,7 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.drawing.styles import styles
 
 ABLATIONS = Path("reports", "validation", "ablations.json")  # validation/campaigns/ablations.py
-METHODS = ("least_squares", "sling2sim2real", "package_si", "real2sim2real")
+METHODS = ("posterior", "paper", "package_si", "real2sim2real")
 ALL = "all"  # the bands together
 
 

@@ -14,10 +14,10 @@ from sling2sim2real.drawing.styles import Styles
 from sling2sim2real.parameters import Quantity
 from sling2sim2real.quantities import QUANTITIES, coordinate
 from sling2sim2real.settings import Params
-from sling2sim2real.settings.identification import LEAST_SQUARES
+from sling2sim2real.settings.identification import POSTERIOR
 
 SEARCHES = {
-    LEAST_SQUARES: "a design, then Levenberg-Marquardt",
+    POSTERIOR: "a design, then Levenberg-Marquardt",
     "de": "differential evolution",
     "bo": "Bayesian optimisation",
     "adam": "Adam on finite differences",
@@ -43,7 +43,7 @@ def methods(results: Results, params: Params, styles: Styles) -> Table:
             search += "" if method_params.covariance else ", isotropic starts"
         fixed = [_held(name, value) for name, value in method_params.fixed.items()]
         held = ", ".join(fixed) or NONE
-        if method_params.search == LEAST_SQUARES:
+        if method_params.search == POSTERIOR:
             terms = ["−2 log p of all recordings and launches"]
         rows.append([style.name, f"`{method}`", search, " + ".join(terms), held])
     return ["method", "in params.yaml", "search", "minimises", "held fixed"], rows
@@ -142,7 +142,7 @@ def losses(results: Results, params: Params, styles: Styles) -> Table:
     rows = []
     for result in results:
         loss, weights = result.theta.get("loss", {}), dict(params.methods[result.method].weights)
-        another = params.methods[result.method].search == LEAST_SQUARES  # minimises no such sum
+        another = params.methods[result.method].search == POSTERIOR  # minimises no such sum
         total = math.nan if another else loss.get("total", math.nan)
         cells = []
         for term in terms:

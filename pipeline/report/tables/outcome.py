@@ -60,12 +60,12 @@ def outcome_table(results: Results, references: tuple[str, ...], styles: Styles)
 def _launched(
     results: Results, references: tuple[str, ...]
 ) -> Iterator[tuple[str, str, list[pd.DataFrame]]]:
-    """What a row is called, its band, and trials of the references; of a dip the first alone."""
+    """What a row is called, its band, and trials: of the references, or the first alone."""
     for band, methods in results.methods.items():
         yield band, band, [methods[method].trials for method in references]
-        for dip in results.dips.values():
-            if dip.band == band:
-                yield f"{band}, pull with dips", band, [dip.trials]
+        for other in results.others.values():
+            if other.band == band:
+                yield f"{band}, {other.recording}", band, [other.trials]
 
 
 def _errors(trials: pd.DataFrame) -> LandingErrors | None:

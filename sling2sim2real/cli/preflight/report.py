@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import asdict, dataclass, field
 
 from sling2sim2real.base.errors import printable
@@ -231,10 +232,17 @@ def _topics(topics: list[Topic]) -> list[str]:
         line = f"{row.topic:<{width}}  {row.role or '-':<11}"
         rows.append((line + "".join(f"{cell:>13}" for cell in cells)).rstrip())
     chosen = [row for row in topics if isinstance(row, Chosen)]
-    wide = max([len(row.role) for row in chosen], default=0) + 2
     if chosen:
-        rows += ["", "chosen"]
-        rows += [f"  {r.role:<{wide}}{r.topic}  ({r.type}): {r.why}" for r in chosen]
+        rows += ["", "chosen (to keep it, or another one: in band.yaml)", *_as_yaml(chosen)]
+    return rows
+
+
+def _as_yaml(chosen: list[Chosen]) -> list[str]:
+    """The choice of topics as the settings of a band hold it, with the reasons behind it."""
+    rows = ["settings:", "  setup:", "    topics:"]
+    for row in chosen:
+        name = row.topic if re.fullmatch(r"[/\w.-]+", row.topic) else json.dumps(row.topic)
+        rows += [f"      {role}: {name}  # {row.type}: {row.why}" for role in row.role.split(", ")]
     return rows
 
 

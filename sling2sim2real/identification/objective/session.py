@@ -1,12 +1,12 @@
-"""What the searching stages share: a band's episodes, and an evaluator that reports."""
+"""What the searching stages share: an evaluator, and one that reports."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
-from sling2sim2real.base.layout import Layout
 from sling2sim2real.base.machine import devices, workers
 from sling2sim2real.base.progress import Progress
 from sling2sim2real.episode.episode import Episode
@@ -41,17 +41,29 @@ class LoggingEvaluator:
 
 
 def logging_evaluator(
-    stage: str, band: str, method: str, params: Params, rollouts: int
+    title: str,
+    params: Params,
+    band: str,
+    method: str,
+    episode: Episode,
+    clamps: Path | None,
+    rollouts: int,
 ) -> LoggingEvaluator:
     """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
-    progress = Progress(f"{stage}-{band}-{method}", rollouts, "rollouts")
-    return LoggingEvaluator(evaluator(params, band, method), progress)
+    evaluate = evaluator(params, band, method, episode, clamps)
+    return LoggingEvaluator(evaluate, Progress(title, rollouts, "rollouts"))
 
 
-def evaluator(params: Params, band: str, method: str) -> Evaluator:
-    """The evaluator of a recorded band, on the devices that the environment names."""
-    episode, engine = load_episode(band), params.methods[method].engine
-    sling = sling_of_method(params, band, method)
+def evaluator(
+    params: Params, band: str, method: str, episode: Episode, clamps: Path | None
+) -> Evaluator:
+    """The evaluator of a recorded band, on the devices that the environment names.
+
+    Args:
+        clamps: As `load_sling` has it.
+    """
+    engine = params.methods[method].engine
+    sling = sling_of_method(params, band, method, clamps)
     return Evaluator(
         episode,
         sling,
@@ -62,13 +74,3 @@ def evaluator(params: Params, band: str, method: str) -> Evaluator:
         simulate=simulate_of(engine),
         whole=engine != OUR_ENGINE,
     )
-
-
-def load_episode(band: str) -> Episode:
-    """The first recorded episode of a band. Raises NotMade."""
-    return Episode.load(Layout().episode(band))
-
-
-def load_episodes(band: str) -> list[Episode]:
-    """All of a band. Raises NotMade."""
-    return Episode.load_all(Layout().episodes(band))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from sling2sim2real.base.layout import Layout
 from sling2sim2real.base.schema import Direction, JsonRecord, Range, read_json
 from sling2sim2real.settings import Params
 from sling2sim2real.simulator.model import ClampedBand
@@ -22,7 +21,7 @@ class Mounting(JsonRecord):
 def load_sling(
     params: Params,
     band: str,
-    root: str | Path = ".",
+    clamps: Path | None,
     law: str = NEO_HOOKEAN,
     *,
     mounted: bool = True,
@@ -30,16 +29,18 @@ def load_sling(
     """A band of params.yaml, mounted as its recording shows where that was fitted.
 
     Args:
-        mounted: False leaves out what was fitted: the band hangs as `setup` says.
+        clamps: File of the mounting that was fitted; without one the band hangs as `setup` says.
+        mounted: False leaves out what was fitted.
 
     Raises NotMade where the file of the mounting is damaged.
     """
-    path = Layout(Path(root)).clamps(band)
-    mounting = read_json(path, Mounting) if mounted and path.exists() else None
+    mounting = None
+    if mounted and clamps is not None and clamps.exists():
+        mounting = read_json(clamps, Mounting)
     return ClampedBand.of(params.bands[band], params.setup, params.sling, mounting, law=law)
 
 
-def sling_of_method(params: Params, band: str, method: str, root: str | Path = ".") -> ClampedBand:
+def sling_of_method(params: Params, band: str, method: str, clamps: Path | None) -> ClampedBand:
     """A band as a method of params.yaml takes it: with its law, mounted or not."""
     method_params = params.methods[method]
-    return load_sling(params, band, root, method_params.law, mounted=method_params.mounting)
+    return load_sling(params, band, clamps, method_params.law, mounted=method_params.mounting)

@@ -21,8 +21,8 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import create_model, model_validator
 
-from sling2sim2real.base.errors import UserError, printable
-from sling2sim2real.base.layout import NotMade, owner
+from sling2sim2real.base.errors import printable
+from sling2sim2real.base.layout import NotMade
 from sling2sim2real.base.schema import JsonRecord, Name, Range, Section, read_json, refusal
 from sling2sim2real.identification.results.confidence import Confidence, Count
 from sling2sim2real.identification.results.mounting import load_sling
@@ -106,10 +106,7 @@ class PosteriorFile(JsonRecord):
 
 
 def load_theta(path: Path, band: str) -> dict:
-    """Read and check a θ file. Raises UserError."""
-    path = Path(path)
-    if not (path.exists() or owner(path)):
-        raise UserError(f"{path}: no such file; `dvc repro` writes those of data/theta/{band}/")
+    """Read and check a θ file. Raises NotMade."""
     content = read_json(path, ThetaFile)
     if content.band != band:
         raise NotMade(path, f'band: must be "{band}", got "{printable(content.band[:60])}"')
@@ -130,10 +127,10 @@ def load_samples(path: Path, theta: Parameters) -> Parameters | None:
     return Parameters.named(theta.law, columns, theta.sample())
 
 
-def calibrated(params: Params, band: str, content: dict, root: str | Path = ".") -> ClampedBand:
+def calibrated(params: Params, band: str, content: dict, clamps: Path | None) -> ClampedBand:
     """The band that a θ file's content is of: of its law, with its clamps calibrated or not."""
     law, mounted = content.get("law", NEO_HOOKEAN), content.get("mounted", True)
-    return load_sling(params, band, root, law, mounted=mounted)
+    return load_sling(params, band, clamps, law, mounted=mounted)
 
 
 def launch_setup(params: Params, content: dict) -> LaunchSetup:

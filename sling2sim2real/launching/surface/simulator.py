@@ -16,7 +16,7 @@ from sling2sim2real.simulator.parameters import Parameters
 
 
 def asked_of_the_hand(
-    params: Params, band: str, content: dict, draw: np.ndarray
+    params: Params, band: str, content: dict, draw: np.ndarray, clamps: Path | None
 ) -> dict[str, float | None] | None:
     """How the hand must draw a band whose law remembers it, and what it costs not to.
 
@@ -27,7 +27,7 @@ def asked_of_the_hand(
     setup = launch_setup(params, content)
     if setup.history is None:
         return None
-    sling, theta = calibrated(params, band, content), parameters_of(content)
+    sling, theta = calibrated(params, band, content, clamps), parameters_of(content)
     longer = replace(setup, history=replace(setup.history, pause=setup.history.pause + 1))
     landings = [launch(sling, variant, theta, draw).landing_y[0] for variant in (setup, longer)]
     moved = float(np.diff(landings)[0])
@@ -42,14 +42,14 @@ def simulator(
     params: Params,
     band: str,
     content: dict,
-    root: str | Path = ".",
+    clamps: Path | None,
     device: str | Sequence[str] = "cpu",
 ) -> Callable[..., Launches]:
     """Function that launches draws, shape (N, 2) [m], in the simulator calibrated by a θ file.
 
     A second argument gives each launch parameters of its own.
     """
-    sling, best = calibrated(params, band, content, root), parameters_of(content)
+    sling, best = calibrated(params, band, content, clamps), parameters_of(content)
     setup, threads = launch_setup(params, content), cores()
 
     def launcher(draws: np.ndarray, parameters: Parameters = best) -> Launches:

@@ -1,4 +1,4 @@
-"""Where the policy of a band and a method lies, and what it says."""
+"""A policy in its folder, and what it says."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from sling2sim2real.base.layout import Layout, NotMade, made
+from sling2sim2real.base.layout import NotMade, made
 from sling2sim2real.base.schema import LIST, JsonRecord, read_json
 
 
@@ -51,20 +51,13 @@ class Card(JsonRecord):
 
 @dataclass(frozen=True)
 class Stored:
-    """The policy of `method` for `band`.
+    """A policy.
 
     Attributes:
-        root: Of the project.
+        folder: Where its files lie, or would.
     """
 
-    band: str
-    method: str
-    root: Path = Path()
-
-    @property
-    def folder(self) -> Path:
-        """Where its files lie, or would."""
-        return Layout(self.root).policy(self.band, self.method)
+    folder: Path
 
     def card(self) -> dict:
         """What its card says (export.card). Raises NotMade: missing, or damaged."""

@@ -14,11 +14,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from sling2sim2real.base.files import read_table, replacing
-from sling2sim2real.base.layout import made
+from sling2sim2real.base.files import replacing
 from sling2sim2real.base.pool import Pool
+from sling2sim2real.launching.launches_file import CHECK, LaunchRow
 from sling2sim2real.launching.surface.stored import Stored
-from sling2sim2real.launching.trials.measured import Measured
 from sling2sim2real.launching.trials.spread import landing_intervals
 from sling2sim2real.settings import Params
 from sling2sim2real.simulator.launch import Launches, limited
@@ -80,44 +79,12 @@ class Batch:
         column_values = getattr(self, name)
         return [None] * len(self.draws) if column_values is None else list(column_values)
 
-    def save(self, path: Path) -> None:
-        """Write one row a launch."""
-        ways = self.every("flight")
-        columns = {
-            "kind": pa.array([self.kind] * len(self.draws), pa.string()),
-            "draw_y": self.draws[:, 0],
-            "draw_z": self.draws[:, 1],
-            "target": pa.array(self.targets, pa.float64()),
-            "landing": pa.array(self.every("landing"), pa.float64()),
-            "failure": pa.array(self.every("failure"), pa.string()),
-            "hold_force": pa.array(self.every("hold_force"), pa.float64()),
-        }
-        for axis, letter in enumerate("yz"):
-            course = [None if way is None else way[:, axis] for way in ways]
-            columns[f"flight_{letter}"] = pa.array(course, pa.list_(pa.float64()))
-        with replacing(path) as temporary:
-            pq.write_table(pa.table(columns), temporary)
 
-    @classmethod
-    def load(cls, path: Path) -> Batch:
-        """Read what `save` wrote. Raises NotMade."""
-        rows = read_table(made(path)).to_pylist()
-        ways = [
-            None if row["flight_y"] is None else np.stack([row["flight_y"], row["flight_z"]], 1)
-            for row in rows
-        ]
-        return cls(
-            kind=rows[0]["kind"],
-            draws=np.array([(row["draw_y"], row["draw_z"]) for row in rows]),
-            flight=ways,
-            targets=[row["target"] for row in rows],
-            **{name: [row[name] for row in rows] for name in ("landing", "failure", "hold_force")},
-        )
-
-
-def scored(launches: Sequence[Measured], method: str) -> list[Batch]:
-    """The user's launches that say something about a method's predictions, if there are any."""
-    chosen = [launch for launch in launches if launch.method in ("", method)]
+def scored(launches: Sequence[LaunchRow], method: str) -> list[Batch]:
+    """The launches to check a method's predictions with, if there are any."""
+    chosen = [
+        launch for launch in launches if launch.use == CHECK and launch.method in ("", method)
+    ]
     if not chosen:
         return []
     landing = [launch.landing for launch in chosen]

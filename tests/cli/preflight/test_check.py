@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.cli.preflight.check import band_of, look_at
@@ -70,7 +71,11 @@ def test_the_verdict_and_its_cautions_come_first(looked) -> None:
         assert lines[basis + 6].startswith(
             "  no mass given, so its weight and the force's direction"
         )
-        assert basis < lines.index("signals") < lines.index("chosen")
+        assert (
+            basis
+            < lines.index("signals")
+            < lines.index("chosen (to keep it, or another one: in band.yaml)")
+        )
     pulls = [replace(looked.report.row, number=number) for number in (1, 2)]
     lines = replace(looked.report, pulls=pulls, cautions=cautions).to_text().splitlines()
     assert lines[2] == "pull 1 of 2: can be used, but:" and lines[5].split()[:2] == [
@@ -116,10 +121,23 @@ def test_a_clock_ahead_is_shown_with_its_sign(tmp_path, params) -> None:
     assert rows["depth"].clock_offset == pytest.approx(-0.0155, abs=0.001)  # it takes a while
 
 
-def test_each_chosen_topic_stands_apart_from_its_role(looked) -> None:
-    """Also where one topic plays two roles."""
-    topics = [replace(row, role=row.role and "wrench, pose") for row in looked.report.topics]
-    assert "  wrench, pose  /ft/wrench  (" in replace(looked.report, topics=topics).to_text()
+def test_the_choice_of_topics_can_be_pasted(looked) -> None:
+    """It is YAML as a band's settings hold it, also where one topic plays two roles."""
+
+    def pasted(report) -> dict:
+        _, _, text = report.to_text().partition("in band.yaml)\n")
+        return YAML(typ="safe").load(text)["settings"]["setup"]["topics"]
+
+    roles = {row.role: row.topic for row in looked.report.topics if row.role}
+    assert pasted(looked.report) == roles
+    topics = [
+        replace(row, role=row.role and "wrench, pose") if row.topic == "/ft/wrench" else row
+        for row in looked.report.topics
+        if row.role != "pose"
+    ]
+    assert pasted(replace(looked.report, topics=topics))["pose"] == "/ft/wrench"
+    odd = [replace(row, topic=f"{row.topic} #1: {{") for row in looked.report.topics]
+    assert pasted(replace(looked.report, topics=odd))["wrench"] == "/ft/wrench #1: {"
 
 
 def test_a_disk_that_is_full_is_one_line(seen, params, tmp_path, monkeypatch) -> None:

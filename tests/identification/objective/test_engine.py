@@ -51,14 +51,14 @@ def test_another_engine_changes_the_loss_and_gets_whole_batches(monkeypatch) -> 
     sling, recorded = recorded_yardstick(PARAMS)
     theirs = "tests.identification.objective.toy_engine:simulate"
     methods = PARAMS.methods
-    other = methods["sling2sim2real"].model_copy(update={"engine": theirs})
+    other = methods["paper"].model_copy(update={"engine": theirs})
     params = PARAMS.model_copy(update={"methods": dict(methods.items()) | {"other": other}})
-    monkeypatch.setattr(session, "load_episode", lambda band: recorded)
     monkeypatch.setattr(session, "sling_of_method", lambda *_: sling)
     unit = np.random.default_rng(1).random((20, 5))  # more than a slice of the CPU
     toy_engine.batches.clear()
     ours, others = (
-        session.evaluator(params, "band1", name)(unit) for name in ("sling2sim2real", "other")
+        session.evaluator(params, "band1", name, recorded, None)(unit)
+        for name in ("paper", "other")
     )
     assert toy_engine.batches == [20]
     both = np.isfinite(ours.total) & np.isfinite(others.total)

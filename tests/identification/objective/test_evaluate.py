@@ -97,14 +97,14 @@ def test_nor_does_either_where_a_law_adds_its_own_axes() -> None:
     """Those of the law rubber, each of which changes the loss."""
     sling, recorded = recorded_yardstick(PARAMS)
     sling = replace(sling, law="rubber")
-    box = SearchBox.of_method(PARAMS, "least_squares")
+    box = SearchBox.of_method(PARAMS, "posterior")
     unit = np.random.default_rng(1).random((20, box.dimension))  # more than a slice
     unit[1:3] = unit[0]
     unit[1, box.names.index("mooney_share")] += 0.1
     unit[2, box.names.index("relaxation")] += 0.1
     unit[:3] %= 1
     evaluations = []
-    loss = EpisodeLoss.of(PARAMS, "least_squares", recorded, sling)
+    loss = EpisodeLoss.of(PARAMS, "posterior", recorded, sling)
     for workers, devices in ((1, ["cpu"]), (2, ["cpu"]), (1, ["cpu", "cpu"])):
         evaluate = Evaluator(recorded, sling, loss, box, workers=workers, devices=devices)
         evaluations.append(evaluate(unit))

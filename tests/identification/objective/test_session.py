@@ -1,14 +1,12 @@
-"""What the searching stages share: a band's episodes, and an evaluator that reports."""
+"""What the searching stages share: an evaluator that reports."""
 
 from pathlib import Path
 
 import numpy as np
 
-from sling2sim2real.base.layout import Layout
 from sling2sim2real.base.progress import parse
 from sling2sim2real.identification.objective import session
 from sling2sim2real.settings import load
-from tests.identification.objective import toy
 from tests.identification.searches.functions import Evaluate, rosenbrock
 from tests.project import DEFAULTS
 
@@ -16,21 +14,12 @@ PARAMS = load(DEFAULTS)
 UNIT = np.random.default_rng(1).random((4, 5))
 
 
-def test_all_episodes_of_a_band_come_in_their_order(tmp_path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    toy.episode().save(Layout().episode("band1"))
-    for number in range(2, 12):  # by number, not by name
-        toy.episode(release_time=1 + number / 100).save(Layout().episode("band1", number))
-    release_times = [episode.release_time for episode in session.load_episodes("band1")]
-    assert release_times[0] == session.load_episode("band1").release_time
-    assert release_times[1:] == [1 + number / 100 for number in range(2, 12)]
-
-
 def test_progress_says_how_far_it_is_and_the_best_so_far(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     weights = dict(PARAMS.methods["de"].weights)
     monkeypatch.setattr(session, "evaluator", lambda *_: Evaluate(rosenbrock, weights=weights))
-    evaluate = session.logging_evaluator("history", "band1", "de", PARAMS, 12)
+    recorded = "band1", "de", None, None
+    evaluate = session.logging_evaluator("history-band1-de", PARAMS, *recorded, 12)
     evaluate(UNIT), evaluate(UNIT), evaluate(1 - UNIT)
     summary = [parse(line) for line in capsys.readouterr().err.splitlines()]
     least = [

@@ -14,7 +14,7 @@ from sling2sim2real.settings.identification import LAWS, UNSEEN
 from sling2sim2real.simulator.parameters import EXTRA, Parameters
 from tests.identification.objective.pulls import PARAMS, sling_of
 
-METHOD = "least_squares"
+METHOD = "posterior"
 SLING = replace(sling_of(0.03), law="rubber")
 OURS = Coordinates.of_method(PARAMS, METHOD, SLING)
 

@@ -22,7 +22,7 @@ from tests import once
 from tests.identification.objective.pulls import PARAMS, pulled, sling_of
 from validation.synthetic import own_law_episode
 
-METHOD, WORKERS, LOSS = "least_squares", 2, "log_loss_factor"
+METHOD, WORKERS, LOSS = "posterior", 2, "log_loss_factor"
 SLING = replace(sling_of(0.03), law="rubber")
 SPACE = Coordinates.of_method(PARAMS, METHOD, SLING)
 CUTOFF = cutoff_hz(PARAMS.force.cutoff, PARAMS.force.cutoff_unit)
@@ -122,7 +122,7 @@ def test_alike_recordings_agree(both):
 
 
 def test_what_is_written_is_a_theta_file(first, tmp_path):
-    path = tmp_path / "least_squares.json"
+    path = tmp_path / "posterior.json"
     content = {"band": "known", **identify.theta_entries(first)}
     content["confidence"] = told_of(first)
     content |= {"loss": dict.fromkeys(("geom", "force", "work", "total"), 1.0), "rollouts": 1}

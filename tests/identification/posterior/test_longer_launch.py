@@ -22,7 +22,7 @@ def summary(params):
     rough = with_(params, "sling", **ROUGH)
     sling = load_sling(rough, "band1", "nowhere", "rubber")
     setup = LaunchSetup.of(rough.setup, rough.sling, LaunchHistory(1.0, 0.5))
-    coordinates = Coordinates.of_method(rough, "least_squares", sling)
+    coordinates = Coordinates.of_method(rough, "posterior", sling)
     phi = coordinates.of(THETA)
     once = launch(sling, setup, coordinates.parameters(phi[None]), np.array([DRAW]))
     assert once.failure[0] is None

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import norm
 
-from sling2sim2real.identification.searches.bayesian import greedy, standardised, training_rows
+from sling2sim2real.identification.searches.bo import greedy, standardised, training_rows
 from tests.identification.searches.functions import (
     CENTRE,
     NAMES,
@@ -75,7 +75,7 @@ def test_it_is_silent_and_torch_waits_until_it_is_asked_for() -> None:
     """Though losses are all alike, points need a jitter, and climbs stop after a few steps."""
     code = """
 import sys, numpy as np
-import sling2sim2real.identification.searches.bayesian
+import sling2sim2real.identification.searches.bo
 import sling2sim2real.identification.searches.adam
 from tests.identification.searches.functions import NAMES, Evaluate, alone, changed
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import optimize
 
 from sling2sim2real.identification.objective.box import latin_hypercube
-from sling2sim2real.identification.searches.differential_evolution import differential_evolution
+from sling2sim2real.identification.searches.de import differential_evolution
 from tests.identification.searches.functions import batches_of, rosenbrock
 
 

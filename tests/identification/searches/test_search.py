@@ -134,7 +134,7 @@ def test_one_free_axis_is_enough() -> None:
 
 def test_every_search_has_the_same_budget() -> None:
     params = load(DEFAULTS)
-    optimizer, explore = params.optimizer, rollouts_of(params, "sling2sim2real")
+    optimizer, explore = params.optimizer, rollouts_of(params, "paper")
     assert explore == optimizer.population * (optimizer.generations + 1)
     assert rollouts_of(params, "bo") == explore + optimizer.cma_rollouts == 600
 

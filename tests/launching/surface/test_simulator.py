@@ -9,13 +9,13 @@ from sling2sim2real.simulator.parameters import THETA
 from tests.project import DEFAULTS, with_
 
 
-def test_the_simulator_launches_in_the_air_of_the_theta_file(tmp_path) -> None:
+def test_the_simulator_launches_in_the_air_of_the_theta_file() -> None:
     """Drag takes speed; that of samples takes the place of the file's, launch by launch."""
     params = with_(load(DEFAULTS), "sling", edges=16, launch_step=1e-3)
     band, draw = next(iter(params.bands)), np.array([[-0.33, -0.15]])
     theta = dict(zip(THETA, (2.5e5, 0.47, 2e-3, 0.8, 0.6), strict=True))
     contents = [{"theta": theta, "nuisances": {"air_drag": drag}} for drag in (0.0, 6.0)]
-    still, moving = (simulator(params, band, content, root=tmp_path) for content in contents)
+    still, moving = (simulator(params, band, content, None) for content in contents)
     calm, windy = (launcher(draw).landing_y[0] for launcher in (still, moving))
     assert windy < 0.99 * calm
     samples = parameters_of(contents[0]).changed(air_drag=np.array([0.0, 6.0]))

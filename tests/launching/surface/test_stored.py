@@ -22,8 +22,8 @@ CARD = {
 }
 
 
-def stored(root, method: str = "none") -> Stored:
-    return Stored("toy", method, root)
+def stored(root) -> Stored:
+    return Stored(root / "policy")
 
 
 def write(policy: Stored, draw: tuple[float, float]) -> None:
@@ -61,7 +61,7 @@ def test_a_damaged_policy_is_one_line(tmp_path) -> None:
 
 
 def test_a_missing_policy_is_one_line(tmp_path) -> None:
-    policy, folder = stored(tmp_path), tmp_path / "data/policies/toy/none"
+    policy, folder = stored(tmp_path), tmp_path / "policy"
     assert refusal(policy.draws, TARGETS) == f"{folder / 'policy.onnx'}: missing"
     assert refusal(policy.card) == f"{folder / 'card.json'}: missing"
 

@@ -8,12 +8,12 @@ import pytest
 from ruamel.yaml import YAML
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.settings import load
+from sling2sim2real.base.files import write_text
 from tests.report.conftest import BAND, METHOD
 from tests.report.conftest import root as root  # noqa: PLC0414
 from tests.report.conftest import template as template  # noqa: PLC0414
 
-HEAD = "draw_y_m,draw_z_m,landing_y_m,target_m,method"
+HEAD = "draw_y,draw_z,landing,use,target,method"
 
 
 @pytest.fixture
@@ -21,20 +21,13 @@ def tried(root: Path, monkeypatch):
     """Run the stage in a finished project; its rows."""
     monkeypatch.chdir(root)
 
-    def run(csv: str | None = None) -> pd.DataFrame:
-        if csv is not None:
-            file = Path("data/trials/measured", f"{BAND}.csv")
-            file.parent.mkdir(exist_ok=True)
-            file.write_text(csv)
-        from stages import evidence, launches, trials
+    def run(csv: str = "draw_y,draw_z,error,landing,use\n") -> pd.DataFrame:
+        write_text(Path("data/launches", f"{BAND}.csv"), csv)
+        from stages import trials
 
-        monkeypatch.setattr(sys, "argv", ["", BAND])
-        evidence.main()
-        monkeypatch.setattr(sys, "argv", ["", BAND, METHOD])
-        if load().bands[BAND].source == "rig":
-            launches.main()
+        monkeypatch.setattr(sys, "argv", ["", f"{BAND}-{METHOD}"])
         trials.main()
-        return pd.read_parquet(Path("data/trials", BAND, f"{METHOD}.parquet"))
+        return pd.read_parquet(Path("data/trials", f"{BAND}-{METHOD}.parquet"))
 
     return run
 
@@ -49,8 +42,9 @@ def test_without_landings_the_policys_draws_are_predicted(tried) -> None:
 
 def test_measured_launches_take_their_place(tried) -> None:
     text = (
-        f"{HEAD}\n-0.30,-0.17,2.2,1.925,{METHOD}\n-0.30,-0.17,,1.925,{METHOD}\n"
-        "-0.31,-0.17,2.3,1.925,\n-0.29,-0.15,1.9,1.725,package_si\n"
+        f"{HEAD}\n-0.30,-0.17,2.2,check,1.925,{METHOD}\n-0.30,-0.17,,check,1.925,{METHOD}\n"
+        "-0.31,-0.17,2.3,check,1.925,\n-0.29,-0.15,1.9,check,1.725,package_si\n"
+        "-0.29,-0.15,1.9,fit,,\n"
     )
     rows = tried(text)
     assert rows.kind.tolist() == ["measured"] * 3
@@ -61,28 +55,28 @@ def test_measured_launches_take_their_place(tried) -> None:
 
 
 def test_landings_of_other_methods_leave_the_policys_own(tried) -> None:
-    rows = tried(f"{HEAD}\n-0.30,-0.17,2.2,1.925,package_si\n")
+    rows = tried(f"{HEAD}\n-0.30,-0.17,2.2,check,1.925,package_si\n")
     assert rows.kind.tolist() == ["predicted"] * 3
 
 
-def test_an_unknown_method_stops_the_stage_and_leaves_what_was_there(tried) -> None:
-    before = Path("data/trials", BAND, f"{METHOD}.parquet").read_bytes()
-    with pytest.raises(UserError, match="line 2: method 'nobody' is not in params.yaml"):
-        tried(f"{HEAD}\n-0.30,-0.17,2.2,1.925,nobody\n")
-    assert Path("data/trials", BAND, f"{METHOD}.parquet").read_bytes() == before
+def test_a_launch_that_none_is_stops_the_stage_and_leaves_what_was_there(tried) -> None:
+    before = Path("data/trials", f"{BAND}-{METHOD}.parquet").read_bytes()
+    with pytest.raises(UserError, match="line 2: use must be fit or check"):
+        tried(f"{HEAD}\n-0.30,-0.17,2.2,score,1.925,\n")
+    assert Path("data/trials", f"{BAND}-{METHOD}.parquet").read_bytes() == before
 
 
 @pytest.mark.slow
 def test_a_rig_band_is_launched_and_measured_launches_stand_apart(tried) -> None:
     yaml = YAML()
     content = yaml.load(Path("params.yaml"))
-    content["run"]["rig"] = [BAND]
+    content["run"]["rig"] = content["run"]["recordings"]
     content["bands"][BAND]["source"] = "rig"
     content["rig"]["bands"][BAND] = content["rig"]["bands"]["band1"]
     content["rig"].update(edges=20, tolerance=1e-4)
     content["trials"].update(targets=[1.725, 1.925], repeats=2)
     yaml.dump(content, Path("params.yaml"))
-    rows = tried(f"{HEAD}\n-0.30,-0.17,2.2,1.925,{METHOD}\n")
+    rows = tried(f"{HEAD}\n-0.30,-0.17,2.2,check,1.925,{METHOD}\n")
     assert rows.kind.tolist() == ["virtual"] * 4 + ["measured"]
     assert rows.trial.tolist() == [1, 2, 1, 2, 1]
     virtual = rows[:4]

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from rig.draw import sampled
-from rig.physics.launch import launch
 from rig.physics.motion import OPEN, PULL, PULLED, HandMotion
 from rig.physics.world import string_of
 from rig.recorder.interaction import hang, pull_and_release
@@ -83,15 +81,3 @@ def test_the_band_follows_a_dip_and_pulls_less_there(coarse: Params) -> None:
     weak = with_(coarse, "rig.pads", force=5.0)
     with pytest.raises(UserError, match="lets the band slip out at"):
         pull_and_release(string, hanging, motion, times, np.array([1.5]), weak)
-
-
-def test_a_band_like_another_has_its_rubber_and_launches_but_other_draws(coarse: Params) -> None:
-    """What a recording draws is its own, what launches draw is the rubber's."""
-    drawing = with_(coarse, "rig", draws={"pads.force": (30, 44), "projectile_drag": (0, 1e-3)})
-    rubber, other = (string_of(drawing, name).rubber for name in ("band1", "band1_dip"))
-    assert (rubber.scale, rubber.law, rubber.viscosity) == (other.scale, other.law, other.viscosity)
-    assert (rubber.relaxation == other.relaxation).all()
-    landed = [launch(name, drawing, DRAW, 3) for name in ("band1", "band1_dip")]
-    assert landed[0] == landed[1] and np.isfinite(landed[0].landing_y)
-    forces = [sampled(drawing, name).rig.pads.force for name in ("band1", "band1_dip")]
-    assert forces[0] != forces[1]

@@ -14,21 +14,18 @@ if TYPE_CHECKING:
     from sling2sim2real.settings import Params
 
 STREAM = 7  # of the seed, apart from those of noise
-OF_LAUNCHES = ("projectile_drag",)
 
 
-def sampled(params: Params, band: str, *, launching: bool = False) -> Params:
-    """`params` with the numbers of a band's recording, or its launches, each within its range.
+def sampled(params: Params, name: str, *, launching: bool = False) -> Params:
+    """`params` with the numbers of a recording, or of a band's launches, each within its range.
 
-    Launches are of the rubber: bands that are `like` one another land alike.
+    Args:
+        name: By which they are drawn: the band's, of a recording with its stream behind.
     """
     rig, values = params.rig, {}
-    if launching:
-        band = rig.bands[band].like or band
-    for key, (low, high) in rig.draws.items():
-        if (key in OF_LAUNCHES) == launching:
-            rng = np.random.default_rng([rig.seed, STREAM, *band.encode(), *key.encode()])
-            values[f"rig.{key}"] = float(f"{rng.uniform(low, high):.4g}")
+    for key, (low, high) in (rig.launch_draws if launching else rig.draws).items():
+        rng = np.random.default_rng([rig.seed, STREAM, *name.encode(), *key.encode()])
+        values[f"rig.{key}"] = float(f"{rng.uniform(low, high):.4g}")
     return cast("Params", _Overlaid(params, values))
 
 

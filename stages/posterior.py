@@ -1,0 +1,72 @@
+"""Fit one density to all episodes of a recording and to the launches that are to fit.
+
+    python -m stages.posterior band1-posterior
+
+Starts at the best point of data/history/<pair>.parquet. Reads data/episodes/ and data/clamps/ of
+the pair's recording, and data/launches/<band>.csv. Writes the exploration and the mode to
+data/evaluations/<pair>.parquet; intervals, and samples of them, to data/confidence/<pair>.json.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.layout import Layout
+from sling2sim2real.base.layout import made
+from sling2sim2real.base.machine import workers
+from sling2sim2real.episode.episode import Episode
+from sling2sim2real.identification.density import entries_of, evaluated_mode
+from sling2sim2real.identification.evaluations import Evaluations
+from sling2sim2real.identification.posterior.identify import fit_posterior
+from sling2sim2real.identification.posterior.launches import Evidence, Observed
+from sling2sim2real.identification.results.confidence_file import save_confidence
+from sling2sim2real.identification.results.mounting import sling_of_method
+from sling2sim2real.launching.launches_file import FIT, read_launches
+from sling2sim2real.settings import Params
+from sling2sim2real.settings.identification import parameter_names
+from sling2sim2real.simulator.model import LaunchSetup
+from stages.start import pair_of_stage, run
+
+
+def main() -> None:
+    params, pair = pair_of_stage()
+    layout, method, law = Layout(), pair.method, params.methods[pair.method].law
+    explored = Evaluations.load(method, parameter_names(law), made(layout.history(pair)))
+    sling = sling_of_method(params, pair.band, method, layout.clamps(pair))
+    episodes = Episode.load_all(layout.episodes(pair))
+    evidence = evidence_of(layout.launches(pair.band), params)
+    density = fit_posterior(
+        params,
+        method,
+        sling,
+        episodes,
+        explored.best_parameters(law),
+        evidence=evidence,
+        workers=workers(),
+        progress=lambda fit: print(
+            f"{pair.key}: expansion {fit.steps}, misfit {fit.misfit:.2f}", flush=True
+        ),
+    )
+    mode = evaluated_mode(params, method, sling, episodes[0], density)
+    explored.followed_by(mode).save(layout.evaluations(pair))
+    entries = entries_of(density, explored)
+    save_confidence(layout.confidence(pair), pair.band, entries, density.parameters)
+
+
+def evidence_of(path: Path, params: Params) -> Evidence | None:
+    """The launches of a file that are to fit, and what launches them here; None without any.
+
+    A draw without an error of its own has that of a commanded one, `trials.actuation_error`.
+    """
+    usual = params.trials.actuation_error
+    observed = [
+        Observed(row.draw, usual if row.error is None else row.error, row.landing)
+        for row in read_launches(made(path))
+        if row.use == FIT and row.landing is not None
+    ]
+    setup = LaunchSetup.of(params.setup, params.sling)
+    return Evidence(observed, setup) if observed else None
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,79 @@
+"""Measured launches read from CSV: to fit or to check, and what is refused."""
+
+from pathlib import Path
+
+import pytest
+
+from sling2sim2real.base.errors import UserError
+from sling2sim2real.launching.launches_file import (
+    COLUMNS,
+    MORE,
+    LaunchRow,
+    read_launches,
+    write_launches,
+)
+from tests.project import ROOT
+
+HEAD = "draw_y,draw_z,error,landing,use"
+
+
+def read(tmp_path: Path, text: str | bytes) -> list[LaunchRow]:
+    file = tmp_path / "toy.csv"
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_launches(file)
+
+
+def test_launches_are_read_as_spreadsheets_write_them(tmp_path) -> None:
+    """With spaces, a byte order mark and lines of commas."""
+    text = (
+        "\ufeffdraw_y, draw_z,error,landing,use,target,method\n"
+        "-0.3,-0.17,,2.2,,,\n-0.31, -0.17 ,0.002,1.9,check,1.925,ours\n"
+        "-0.3,-0.17,0,,check,1.9,\n,,,,,,\n\n"
+    )
+    assert read(tmp_path, text) == [
+        LaunchRow((-0.3, -0.17), None, 2.2),
+        LaunchRow((-0.31, -0.17), 0.002, 1.9, "check", 1.925, "ours"),
+        LaunchRow((-0.3, -0.17), 0.0, None, "check"),  # nobody aimed it
+    ]
+    assert read(tmp_path, HEAD) == [] == read_launches(tmp_path / "none.csv")
+
+
+def test_what_is_written_is_read(tmp_path) -> None:
+    rows = [LaunchRow((-0.3, -0.1), None, 1.9), LaunchRow((-0.2, 0.1), 0.01, None, "check")]
+    write_launches(tmp_path / "a.csv", rows)
+    assert read_launches(tmp_path / "a.csv") == rows
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("draw_y,draw_z\n-0.3,-0.1\n", "lacks the column landing"),
+        (f"{HEAD},speed\n", "unknown column 'speed'"),
+        (f"{HEAD},landing\n", "two columns landing"),
+        ("", "lacks the column draw_y"),
+        (f"{HEAD}\n-0.3,-0.1,,far,fit\n", "line 2: landing must lie from 0 to 20 m"),
+        (f"{HEAD}\n-0.3,-0.1,,1,\n-0.3,,,1,\n", "line 3: a launch needs draw_y and draw_z"),
+        (f"{HEAD}\n0.3,-0.1,,1,\n", "line 2: draw_y must lie from -20 to 0 m"),
+        (f"{HEAD}\n-0.3,-0.1,0.2,1,\n", "line 2: error must lie from 0 to 0.1 m"),
+        (f"{HEAD}\n-0.3,-0.1,,,fit\n", "line 2: a launch that did not land is no evidence"),
+        (f"{HEAD}\n-0.3,-0.1,,1,score\n", "line 2: use must be fit or check, got 'score'"),
+        (f"{HEAD}\n-0.3,-0.1,,1,fit,9\n", "line 2: more cells than the 5 columns"),
+        (f"{HEAD},method\n-0.3,-0.1,,1,fit,ours\n", "line 2: a launch that a policy aimed is to"),
+        (
+            f"{HEAD},target,method\n-0.3,-0.1,,1,check,2.425,a\n-0.3,-0.1,,1,check,3.0,a\n",
+            "line 3: target must lie from 1.425 to 2.425 m",
+        ),
+        ((f"{HEAD}\n-0.3,-0.1,,1,\n").encode("utf-16"), "not UTF-8"),
+        (f"{HEAD}\n".encode() + b"1" * 200_000, "cannot be read as CSV"),
+    ],
+)
+def test_refuses_what_no_launch_can_have_done(tmp_path, text: str | bytes, message: str) -> None:
+    with pytest.raises(UserError, match=message) as refused:
+        read(tmp_path, text)
+    assert str(refused.value).startswith(str(tmp_path / "toy.csv"))
+    assert "\n" not in str(refused.value)
+
+
+def test_the_format_is_documented() -> None:
+    text = (ROOT / "data/launches/README.md").read_text(encoding="utf-8")
+    assert all(f"`{name}`" in text for name in (*COLUMNS, *MORE))

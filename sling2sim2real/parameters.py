@@ -9,6 +9,7 @@ params.yaml that search it, and a row in docs/glossary.md.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -71,13 +72,19 @@ class Parameter(Quantity):
 
     Attributes:
         reach: How far a box, or a θ file, may reach.
+        box, scale: Within which searches look for it, unless params.yaml says otherwise. What is
+            of every law beside THETA only a density looks for, within its coordinate's bounds.
         law: Whose it is; "": of every law.
+        fixed: At what a density fixes it; None: it does not.
         default: Where nothing says it; None: something must.
         coordinate: None: no pull shows it, and a method that fits a density fixes it.
     """
 
     reach: tuple[float, float]
+    box: tuple[float, float] = (0.0, 1.0)
+    scale: Literal["linear", "log"] = "linear"
     law: str = ""
+    fixed: float | None = None
     default: float | None = 0.0
     coordinate: Coordinate | None = None
 
@@ -107,6 +114,8 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         si="Pa",
         read=("kPa", 1e-3),
         reach=(1e3, 1e9),
+        box=(3e4, 1e7),
+        scale="log",
         default=None,
         coordinate=Coordinate(0.005, log=True),
     ),
@@ -115,6 +124,7 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         label="Mooney share",
         symbol="Mooney share",
         reach=(-1.0, 1.0),
+        box=(-0.3, 0.9),
         law=RUBBER,
         coordinate=Coordinate(0.02),
     ),
@@ -123,6 +133,7 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         label="upturn of the stress",
         symbol="upturn",
         reach=(0.0, 1.0),
+        box=(0.0, 0.3),
         law=RUBBER,
         coordinate=Coordinate(0.01),
     ),
@@ -134,6 +145,7 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         symbol="softening",
         read=PERCENT,
         reach=(0.0, 0.9),
+        box=(0.0, 0.6),
         law=RUBBER,
         coordinate=Coordinate(0.02, prior=(0.0, 0.3), half=True),
     ),
@@ -143,6 +155,7 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         symbol="relaxation",
         read=PERCENT,
         reach=(0.0, 0.2),
+        box=(0.0, 0.2),
         law=RUBBER,
         coordinate=Coordinate(0.004),
     ),
@@ -152,6 +165,7 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         symbol="flow",
         read=PERCENT,
         reach=(0.0, 1.0),
+        box=(0.0, 0.6),
         law=RUBBER,
         coordinate=Coordinate(0.01, prior=(0.0, 0.15), half=True),
     ),
@@ -160,6 +174,7 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         label="log10 flow rate",
         symbol="log10 flow rate",
         reach=(-1.0, 6.0),
+        box=(0.0, 5.0),
         law=RUBBER,
         # a stress of E/5 flows in a second, within a decade
         coordinate=Coordinate(0.03, prior=(2.0, 1.0)),
@@ -171,21 +186,37 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         si="s",
         read=MILLISECONDS,
         reach=(1e-6, 1.0),
+        box=(1e-4, 5e-2),
+        scale="log",
         default=None,
         # that of the loss factor s d c/L, which identification/posterior/coordinates.py explains
         coordinate=Coordinate(0.05, prior=LOSS_FACTOR, log=True, name="log_loss_factor"),
     ),
     Parameter(
-        name="damping_scale", label="damping scale", symbol="s", reach=(0.0, 1.0), default=None
+        name="damping_scale",
+        label="damping scale",
+        symbol="s",
+        reach=(0.0, 1.0),
+        box=(0.0, 1.0),
+        fixed=0.6,
+        default=None,
     ),
     Parameter(
-        name="poissons_ratio", label="Poisson's ratio", symbol="ν", reach=(0.0, 0.495), default=None
+        name="poissons_ratio",
+        label="Poisson's ratio",
+        symbol="ν",
+        reach=(0.0, 0.495),
+        box=(0.3, 0.49),
+        fixed=0.47,
+        default=None,
     ),
     Parameter(
         name="dynamic_friction",
         label="friction of the pads",
         symbol="friction",
         reach=(0.0, 5.0),
+        box=(0.05, 1.0),
+        fixed=0.8,
         default=None,
     ),
     Quantity("damping_product", "damping scale × damping time", "damping s·d", "s", MILLISECONDS),

@@ -19,6 +19,7 @@ ROW = Parameter(
     symbol="stiffening",
     read=PERCENT,
     reach=(0.0, 0.5),
+    box=(0.0, 0.4),
     law="rubber",
     coordinate=Coordinate(0.02, prior=(0.0, 0.1), half=True),
 )
@@ -33,10 +34,11 @@ from sling2sim2real.identification.results.theta import (  # noqa: E402
     parameters_of,
 )
 from sling2sim2real.quantities import QUANTITIES  # noqa: E402
-from sling2sim2real.settings import parse  # noqa: E402
+from sling2sim2real.settings import Settings  # noqa: E402
+from sling2sim2real.settings.identification import POSTERIOR  # noqa: E402
+from sling2sim2real.settings.lab import BandParams  # noqa: E402
 from sling2sim2real.simulator import launch, material  # noqa: E402
 from sling2sim2real.simulator.model import ClampedBand, LaunchHistory, LaunchSetup  # noqa: E402
-from tests.project import DEFAULTS  # noqa: E402
 
 original = material.material
 
@@ -49,11 +51,9 @@ def stiffened(band, theta, rigidity=None):
 
 
 def main(folder: Path) -> None:
-    text = DEFAULTS.read_text(encoding="utf-8")
-    method = next(name for name, of in parse_with(text).methods.items() if of.law == "rubber")
-    params = parse_with(text)
-    band = params.bands["band1"]
-    sling = ClampedBand.of(band, params.setup, params.sling, law="rubber")
+    params, method = Settings.default(), POSTERIOR
+    sizes = BandParams(source="rig", mass=0.02, diameter=0.01, rest_length=0.52)
+    sling = ClampedBand.of(sizes, params.setup, params.sling, law="rubber")
     box = SearchBox.of_method(params, method)
     assert NAME in box.free and box.high[box.names.index(NAME)] == 0.4
     density = Coordinates.of_method(params, method, sling)
@@ -79,12 +79,6 @@ def main(folder: Path) -> None:
             module.material = stiffened
     landed = launch(sling, setup, both, np.tile([-0.36, -0.15], (2, 1))).landing_y
     assert landed[1] > 1.1 * landed[0], landed
-
-
-def parse_with(text: str):
-    """params.yaml with bounds of the new parameter beside those of the flow's rate."""
-    begin = text.index("      log_flow_rate:")
-    return parse(text[:begin] + f"      {NAME}: [0.0, 0.4]\n" + text[begin:])
 
 
 if __name__ == "__main__":

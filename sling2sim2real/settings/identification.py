@@ -8,7 +8,7 @@ from pydantic import AfterValidator, create_model, model_validator
 
 from sling2sim2real.base.imported import is_import
 from sling2sim2real.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
-from sling2sim2real.parameters import THETA, added_by, parameters
+from sling2sim2real.parameters import THETA, Parameter, added_by, parameters
 
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound", bound=float)
@@ -16,7 +16,7 @@ KTop = Annotated[int, Range(1, 50)]
 Law = Literal["neo_hookean", "rubber", "corotated"]  # of the band's material
 # What each has beside the parameters of every law, and how far its box may reach.
 LAWS = {law: added_by(law) for law in get_args(Law)}
-POSTERIOR = "posterior"
+POSTERIOR, PAPER = "posterior", "paper"
 UNSEEN = tuple(  # what a pull does not show
     row.name for row in parameters("neo_hookean") if row.coordinate is None
 )
@@ -27,15 +27,15 @@ ENGINES = OUR_ENGINE, "physx"
 
 
 class SlingParams(Section):
-    edges: Annotated[int, Range(4, 400)]
-    grading: Annotated[float, Range(1, 20)]
-    grip_step: Step
-    hold_step: Step
-    recoil_step: Step
-    recoil_time: Annotated[float, Range(1e-3, 10)]
-    swing_step: Step
-    launch_step: Step
-    launch_time: Annotated[float, Range(0.01, 10)]
+    edges: Annotated[int, Range(4, 400)] = 24
+    grading: Annotated[float, Range(1, 20)] = 8.0
+    grip_step: Step = 0.005
+    hold_step: Step = 0.02
+    recoil_step: Step = 0.00025
+    recoil_time: Annotated[float, Range(1e-3, 10)] = 0.1
+    swing_step: Step = 0.001
+    launch_step: Step = 0.00025
+    launch_time: Annotated[float, Range(0.01, 10)] = 0.5
 
     @model_validator(mode="after")
     def _middle_is_a_layer(self) -> SlingParams:
@@ -60,11 +60,13 @@ class Box(Section, Generic[Bound]):
         return self
 
 
-_BOXES: dict[str, Any] = {
-    row.name: Box[Annotated[float, Range(*row.reach)]]
-    for row in parameters("neo_hookean")
-    if row.name in THETA
-}
+def _axis(row: Parameter) -> Any:
+    kind = Box[Annotated[float, Range(*row.reach)]]
+    low, high = row.box
+    return kind, kind(low=low, high=high, scale=row.scale)
+
+
+_BOXES = {row.name: _axis(row) for row in parameters("neo_hookean") if row.name in THETA}
 
 
 class ParameterBoxes(create_model("_ParameterBoxes", __base__=Section, **_BOXES)):
@@ -72,8 +74,8 @@ class ParameterBoxes(create_model("_ParameterBoxes", __base__=Section, **_BOXES)
 
 
 class LossParams(Section):
-    chamfer: Literal["symmetric", "clouds"]
-    median_window: Annotated[int, Range(1, 101)]
+    chamfer: Literal["symmetric", "clouds"] = "symmetric"
+    median_window: Annotated[int, Range(1, 101)] = 7
 
     @model_validator(mode="after")
     def _window_has_a_middle(self) -> LossParams:
@@ -86,16 +88,16 @@ Factor = Annotated[float, Range(0, 1.99)]  # SciPy's differential evolution want
 
 
 class OptimizerParams(Section):
-    seed: Seed
-    population: Annotated[int, Range(5, 100_000)]
-    generations: Annotated[int, Range(1, 100_000)]
-    mutation: Annotated[tuple[Factor, Factor], LIST, ASCENDING]
-    recombination: Annotated[float, Range(0, 1)]
-    k_top: KTop
-    k_nn: Annotated[int, Range(6, 10_000)]  # a covariance of five parameters needs six points
-    delta: Annotated[float, Range(1e-3, 2)]
-    cma_population: Annotated[int, Range(4, 10_000)]
-    cma_rollouts: Annotated[int, Range(4, 10_000_000)]
+    seed: Seed = 1
+    population: Annotated[int, Range(5, 100_000)] = 20
+    generations: Annotated[int, Range(1, 100_000)] = 8
+    mutation: Annotated[tuple[Factor, Factor], LIST, ASCENDING] = (0.5, 1.0)
+    recombination: Annotated[float, Range(0, 1)] = 0.7
+    k_top: KTop = 5
+    k_nn: Annotated[int, Range(6, 10_000)] = 15  # a covariance of five parameters needs six points
+    delta: Annotated[float, Range(1e-3, 2)] = 0.1
+    cma_population: Annotated[int, Range(4, 10_000)] = 8
+    cma_rollouts: Annotated[int, Range(4, 10_000_000)] = 420
 
     @model_validator(mode="after")
     def _budgets_suffice(self) -> OptimizerParams:
@@ -112,9 +114,9 @@ Weight = Annotated[float, Range(0, 1e6)]
 
 
 class Weights(Section):
-    geom: Weight
-    force: Weight
-    work: Weight
+    geom: Weight = 1.0
+    force: Weight = 1.0
+    work: Weight = 1.0
 
     @model_validator(mode="after")
     def _something_counts(self) -> Weights:
@@ -148,21 +150,21 @@ Bounds = Annotated[tuple[Value, Value], LIST]
 class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
-    law: Law
-    search: Annotated[str, _one_of(SEARCHES, "function")]
-    engine: Annotated[str, _one_of(ENGINES, "function")]
-    settings: dict[str, Setting]
-    fixed: dict[str, Value]
-    bounds: dict[str, Bounds]
-    k_top: KTop | None
-    mounting: bool
-    covariance: bool
+    law: Law = "neo_hookean"
+    search: Annotated[str, _one_of(SEARCHES, "function")] = "multistart"
+    engine: Annotated[str, _one_of(ENGINES, "function")] = "sling"
+    settings: dict[str, Setting] = {}
+    fixed: dict[str, Value] = {}
+    bounds: dict[str, Bounds] = {}
+    k_top: KTop | None = None
+    mounting: bool = True
+    covariance: bool = True
 
 
 class MethodParams(MethodDefaults):
     """What is weighed, what is searched, and how."""
 
-    weights: Weights
+    weights: Weights = Weights()
 
     @model_validator(mode="after")
     def _keys_belong_to_the_search(self) -> MethodParams:
@@ -200,6 +202,17 @@ class MethodParams(MethodDefaults):
                     f" {self.law} searches"
                 )
         return self
+
+
+METHODS = {
+    PAPER: MethodParams(),  # the paper's
+    POSTERIOR: MethodParams(  # ours: the mode of one density over all recordings and launches
+        search=POSTERIOR,
+        law="rubber",
+        fixed={row.name: row.fixed for row in parameters("rubber") if row.fixed is not None},
+        bounds={row.name: row.box for row in parameters("rubber") if row.law},
+    ),
+}
 
 
 def parameter_names(law: str) -> tuple[str, ...]:

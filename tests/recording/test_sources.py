@@ -60,10 +60,8 @@ def test_an_odometry_and_one_pose_of_several(params) -> None:
         }
         for k in range(COUNT)
     ]
-    for kind, messages in (("nav_msgs/Odometry", odometry), ("foxglove.PosesInFrame", poses)):
-        frame, values = played(
-            chosen(params, wrench("/ft"), channel("/hand", kind, messages))["pose"]
-        )
+    for kind, hand in (("nav_msgs/Odometry", odometry), ("foxglove.PosesInFrame", poses)):
+        frame, values = played(chosen(params, wrench("/ft"), channel("/hand", kind, hand))["pose"])
         assert frame == "base"
         assert_poses(values)
     assert chosen(params, wrench("/ft"), pose("/a"), channel("/ee", kind, messages))["pose"].channel

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from sling2sim2real.settings.run import Pair, Recording
+from pipeline.params.run import Pair, Recording
 
 
 @dataclass(frozen=True)

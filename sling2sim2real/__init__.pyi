@@ -15,7 +15,6 @@ from .api.model import Model as Model
 from .api.model import Theta as Theta
 from .api.objective import Objective as Objective
 from .api.rehearsal import rehearse as rehearse
-from .api.settings import Settings as Settings
 from .api.simulation import Simulation as Simulation
 from .api.simulation import pull as pull
 from .api.simulation import simulate as simulate
@@ -24,6 +23,7 @@ from .base.errors import UserError as UserError
 from .episode.episode import Episode as Episode
 from .identification.posterior.launches import Observed as Observed
 from .identification.results.mounting import Mounting as Mounting
+from .settings import Settings as Settings
 from .simulator.model import LaunchHistory as LaunchHistory
 
 __version__: str

@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from pipeline.layout import Layout
+from pipeline.params import load
 from rig.physics.launch import Trial, launch
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.theta import load_samples, load_theta, parameters_of
@@ -23,7 +24,6 @@ from sling2sim2real.launching.surface.simulator import simulator
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials import trials
 from sling2sim2real.launching.trials.stretch import recorded_stretch, stretch_of
-from sling2sim2real.settings import load
 from stages.start import pair_of_stage, run
 
 

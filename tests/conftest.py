@@ -8,7 +8,7 @@ import sys
 import pytest
 from hypothesis import settings
 
-from sling2sim2real.settings import Params, load
+from pipeline.params import Params, load
 from tests.project import DEFAULTS
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as stages have it; nothing has imported NumPy yet

@@ -1,5 +1,6 @@
 """What README and docs say is so: links, commands, stages, keys, Python."""
 
+import argparse
 import ast
 import importlib.util
 import re
@@ -10,6 +11,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from sling2sim2real.card.text import GLOSSARY
+from sling2sim2real.cli import checkout
 from sling2sim2real.cli.cli import parser
 from sling2sim2real.quantities import QUANTITIES
 from tests.project import DEFAULTS, ROOT, texts
@@ -123,7 +125,10 @@ def test_every_command_is_one() -> None:
 
 
 def sling(words: list[str]) -> None:
-    parser().parse_args(words)
+    if words[0] in checkout.COMMANDS:
+        parser_of(words[0]).parse_args(words[1:])
+    else:
+        parser().parse_args(words)
 
 
 def make(words: list[str]) -> None:
@@ -172,6 +177,16 @@ def is_file(name: str) -> bool:
     return name.rpartition(".")[2] in {"csv", "json", "md", "onnx", "png", "pt", "py", "yaml"}
 
 
+def parser_of(name: str) -> argparse.ArgumentParser:
+    """Of a command: its own, or that of the module of a checkout."""
+    if name in checkout.COMMANDS:
+        module = checkout.COMMANDS[name][0]
+        here = importlib.util.find_spec(f"{module}.__main__") if module == "pipeline.flow" else None
+        return importlib.import_module(f"{module}.__main__" if here else module).parser()
+    (subs,) = (action for action in parser()._actions if action.choices)
+    return subs.choices[name]
+
+
 def test_every_option_is_one() -> None:
     """Commands in sentences, of messages too: `sling check --sheet`; placeholders may follow."""
     subs = next(
@@ -188,7 +203,8 @@ def test_every_option_is_one() -> None:
             elif name[0].isalpha():
                 assert name in subs, f"{file}: {span}"
                 flags = {word.partition("=")[0].strip("[]") for word in more if word[:2] == "--"}
-                assert flags <= set(subs[name]._option_string_actions), f"{file}: {span}"
+                options = parser_of(name)._option_string_actions
+                assert flags <= set(options), f"{file}: {span}"
                 count += 1
     assert count > 60
 
@@ -214,7 +230,7 @@ def imported(node: ast.AST) -> list[tuple[str, str]]:
 
 def test_what_commands_say_is_quoted_as_they_say_it() -> None:
     """Each piece of a line that docs/faq.md quotes stands in the code."""
-    places = "sling2sim2real/recording", "sling2sim2real/episode", "app", "stages"
+    places = "sling2sim2real/recording", "sling2sim2real/episode", "sling2sim2real/cli", "stages"
     folders = [ROOT / place for place in places]
     files = sorted(file for folder in folders for file in folder.rglob("*.py"))
     code = "\n".join(file.read_text(encoding="utf-8") for file in files)

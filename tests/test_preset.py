@@ -12,8 +12,8 @@ import pytest
 from dvc.utils.hydra import apply_overrides
 from ruamel.yaml import YAML
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS, ROOT, until
 from tools.preset import PRESETS, preset, store_report, write_preset
 

@@ -3,7 +3,7 @@
 DVC re-runs a stage when something listed changes; it cannot see Python's imports. This follows what
 a stage's script imports, at any depth and inside functions too, and takes the folder of each such
 file: one folder a concern. Some files are nobody's dependency, for no result depends on them but by
-what DVC tracks by itself: the models of params.yaml, which hold no default; the layout, which
+what DVC tracks by itself: the models of params.yaml, which has each key; the layout, which
 spells dvc.yaml's paths; and stages/start.py, which reads the arguments. Searches are found by
 name, so that no import says which of them a stage runs: their files are listed by hand.
 """

@@ -20,6 +20,7 @@ from PIL import Image, ImageDraw
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
+from pipeline.params import load  # noqa: E402
 from sling2sim2real.base import errors  # noqa: E402
 from sling2sim2real.base.errors import UserError  # noqa: E402
 from sling2sim2real.base.layout import Layout, made  # noqa: E402
@@ -30,7 +31,6 @@ from sling2sim2real.card.simulated import simulate  # noqa: E402
 from sling2sim2real.drawing.styles import INK  # noqa: E402
 from sling2sim2real.episode.episode import Episode  # noqa: E402
 from sling2sim2real.identification.results.theta import load_theta  # noqa: E402
-from sling2sim2real.settings import load  # noqa: E402
 
 PAGE = ROOT / "docs" / "hero.webp"
 OURS, PAPER = "posterior", "paper"

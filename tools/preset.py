@@ -25,11 +25,11 @@ from dvc.utils.serialize import dumps_yaml, parse_yaml_for_update
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
+from pipeline.params import Params  # noqa: E402
 from pipeline.report.run import write_run  # noqa: E402
 from sling2sim2real.base import errors  # noqa: E402
 from sling2sim2real.base.errors import UserError  # noqa: E402
 from sling2sim2real.base.files import replacing_folder, write_text  # noqa: E402
-from sling2sim2real.settings import parse  # noqa: E402
 
 PRESETS = ROOT / "presets"
 PAGES, PARTS = ("README.md", "appendix.md"), ("figures", "tables", "run.js")
@@ -55,7 +55,7 @@ def write_preset(path: Path, changes: dict) -> None:
     content = parse_yaml_for_update(path.read_text(encoding="utf-8"), str(path))
     _merge(content, changes)
     text = dumps_yaml(content)
-    parse(text, str(path))
+    Params.parse(text, str(path))
     write_text(path, text)
 
 

@@ -20,9 +20,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 BUDGETS = {  # what was reached on 2026-11-28, plus 2 %; the whole is as asked
-    "pipeline": 21_000,
-    "app": 3_710,
-    "sling2sim2real": 925,
+    "pipeline": 4_000,
+    "sling2sim2real": 22_500,
     "stages": 551,
     "rig": 1_940,
     "validation": 7_210,

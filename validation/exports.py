@@ -12,6 +12,7 @@ import tempfile
 from importlib.metadata import version
 from pathlib import Path
 
+from pipeline.params import load
 from sling2sim2real.api.exporting import export
 from sling2sim2real.api.identification import Identification
 from sling2sim2real.base import errors
@@ -20,7 +21,6 @@ from sling2sim2real.base.layout import Layout
 from sling2sim2real.base.machine import devices
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.exporting.card import ASKED
-from sling2sim2real.settings import load
 from validation.reports import write_report
 
 REPORT = "reports/validation/export-{}.json"

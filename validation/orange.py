@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sling2sim2real.settings import Params
+from pipeline.params import Params
 from validation.projects import changed
 
 NAME = "orange"

@@ -11,10 +11,8 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-import networkx
-
 from sling2sim2real.base import errors
-from sling2sim2real.base.code import CODE, ROOT, concern, imports
+from sling2sim2real.base.code import ROOT
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_text
 from sling2sim2real.recording.checks import CHECKS
@@ -25,43 +23,6 @@ from validation.campaigns.runner import read
 from validation.reports import row
 
 CODE_BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)  # language, code
-WHOLE = "stages", "app", "sling2sim2real", "validation", "rig"  # each a box; the library is several
-LEFT_OUT = "sling2sim2real/base", "sling2sim2real/settings"  # which all import
-DEVELOPERS = "sling2sim2real/cli/developer.py"  # may import validation/
-
-
-def box(file: str) -> str:
-    """The box of a file: a top-level package, or a folder of the library."""
-    top = file.partition("/")[0]
-    if top in WHOLE:
-        return top
-    folder = concern(file)
-    return "/".join(folder.split("/")[:2]) if folder.count("/") > 1 else folder
-
-
-def arrows() -> list[tuple[str, str]]:
-    """List who imports whom, sorted: the transitive reduction of all imports."""
-    graph = networkx.DiGraph()
-    for file in sorted(file for top in CODE for file in (ROOT / top).rglob("*.py")):
-        if file == ROOT / DEVELOPERS:
-            continue
-        here = box(file.relative_to(ROOT).as_posix())
-        for other in imports(file):
-            there = box(other.relative_to(ROOT).as_posix())
-            if here != there and not there.endswith(".py") and there not in LEFT_OUT:
-                graph.add_edge(here, there)
-    graph.remove_nodes_from(LEFT_OUT)
-    return sorted(networkx.transitive_reduction(graph).edges)
-
-
-def diagram() -> list[str]:
-    """Who imports whom, as Mermaid draws it."""
-
-    def node(folder: str) -> str:
-        return f"{folder.replace('/', '_')}[{folder}]"
-
-    lines = [f"  {node(here)} --> {node(there)}" for here, there in arrows()]
-    return ["```mermaid", "flowchart TD", *lines, "```"]
 
 
 def checks() -> list[str]:
@@ -76,7 +37,6 @@ def checks() -> list[str]:
 
 BLOCKS: dict[str, tuple[str, Callable[[], list[str]]]] = {  # by page: name of its marks, its lines
     "README.md": ("landings", headline.block),
-    "docs/architecture.md": ("imports", diagram),
     "docs/faq.md": ("checks", checks),
     "docs/identification.md": (
         "landings",

@@ -18,9 +18,9 @@ from typing import TypeVar
 import psutil
 from ruamel.yaml import YAML
 
+from pipeline.params import Params, load
+from pipeline.params.run import PLAIN, UNIONS
 from sling2sim2real.base.code import ROOT
-from sling2sim2real.settings import Params, load
-from sling2sim2real.settings.run import PLAIN, UNIONS
 
 DEFAULTS = ROOT / "params.yaml"
 CLI = (

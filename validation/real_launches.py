@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from sling2sim2real import settings
+from pipeline import params as settings
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.simulator import ClampedBand, Launches, LaunchSetup, Parameters, launch

@@ -38,7 +38,7 @@ from colorsys import hsv_to_rgb
 
 import numpy as np
 
-from sling2sim2real.settings import Params
+from pipeline.params import Params
 from validation.projects import changed
 
 DEVELOP, SEALED, SPENT = 20261101, 20270411, 20261229  # seeds

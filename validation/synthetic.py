@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.params import Params
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.signal import average, lowpass, uniform
 from sling2sim2real.identification.objective.loss import EpisodeLoss
-from sling2sim2real.settings import Params
 from sling2sim2real.simulator.interaction import interact
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters

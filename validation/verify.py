@@ -7,9 +7,9 @@ Run in the project's folder; writes reports/simulator.md. Exit status 1 if a lim
 
 from __future__ import annotations
 
+from pipeline.params import load
 from sling2sim2real.base import errors
 from sling2sim2real.cli.command_line import Parser
-from sling2sim2real.settings import load
 from validation.simulator.verification import summary, verify
 
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.flow import dvc, server
+from pipeline.params import load
 from sling2sim2real.base import errors
 from sling2sim2real.base.disk import expect_ready
 from sling2sim2real.cli import arguments as kinds
 from sling2sim2real.cli.command_line import Parser
-from sling2sim2real.settings import load
 
 
 def parser() -> Parser:

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.params import Params
 from pipeline.report.results import Result
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.identification.results.theta import calibrated, parameters_of
-from sling2sim2real.settings import Params
 
 AXES = "youngs_modulus", "elasticity_damping"  # two dominant factors, the paper says
 SIZE = 17  # rollouts along each axis

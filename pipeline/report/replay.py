@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.layout import Layout
+from pipeline.params import Params
+from pipeline.params.run import Pair
 from sling2sim2real.base.layout import NotMade
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.identification.results.theta import calibrated, parameters_of
-from sling2sim2real.settings import Params
-from sling2sim2real.settings.run import Pair
 from sling2sim2real.simulator.replay import replay
 
 

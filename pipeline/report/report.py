@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.layout import Layout
+from pipeline.params import Params
 from pipeline.report.landscape import Landscape, landscape
 from pipeline.report.paper import METHOD
 from pipeline.report.replay import MethodReplay, replay_method
@@ -15,7 +16,6 @@ from pipeline.report.results import Result, Results, gather
 from sling2sim2real.drawing.canvas import P, Saving
 from sling2sim2real.drawing.styles import Styles, drawn, styles
 from sling2sim2real.launching.surface.stored import Stored
-from sling2sim2real.settings import Params
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from pipeline.params import Params
 from pipeline.report.chapters.appendix import appendix
 from pipeline.report.chapters.evaluation import evaluation
 from pipeline.report.chapters.outcome import outcome
@@ -15,7 +16,6 @@ from pipeline.report.report import Report
 from pipeline.report.run import write_run
 from sling2sim2real.base.files import write_json, write_text
 from sling2sim2real.drawing.page import page
-from sling2sim2real.settings import Params
 
 # The chapters of each page: each makes its text of a Report, and writes what the text shows.
 PAGES = {"README": (outcome, paper_tables, evaluation), "appendix": (appendix,)}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sling2sim2real.settings import Params
+from pipeline.params import Params
 
 
 def trial_numbers(params: Params) -> np.ndarray:

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.params import load
 from rig.oracle.aim import hit
 from rig.physics.launch import Trial, launch
 from sling2sim2real.base.pool import Pool
 from sling2sim2real.launching.surface.landing_map import LandingMap
-from sling2sim2real.settings import load
 from sling2sim2real.settings.lab import SetupParams
 
 

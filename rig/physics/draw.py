@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 if TYPE_CHECKING:
-    from sling2sim2real.settings import Params
+    from pipeline.params import Params
 
 STREAM = 7  # of the seed, apart from those of noise
 

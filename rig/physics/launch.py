@@ -18,7 +18,7 @@ from sling2sim2real.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK
 from sling2sim2real.base.target import TARGET_AREA
 
 if TYPE_CHECKING:
-    from sling2sim2real.settings import Params
+    from pipeline.params import Params
 
 PATIENCE = 0.5  # s within which the projectile leaves the pouch, if it ever does
 FLIGHT = 20.0  # s, more than any flight takes

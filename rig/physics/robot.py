@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 if TYPE_CHECKING:
-    from sling2sim2real.settings import RigParams
+    from pipeline.params import RigParams
 
 SENSOR_LEVER = 0.15  # m from the force sensor to the tool centre point
 

@@ -16,7 +16,7 @@ from rig.physics.integration import integrated
 from rig.physics.motion import Path, place
 
 if TYPE_CHECKING:
-    from sling2sim2real.settings.virtual_rig import RigArm
+    from pipeline.params.virtual_rig import RigArm
 
 
 class Servo(NamedTuple):

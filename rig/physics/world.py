@@ -14,8 +14,8 @@ from rig.physics.rubber import Flow, Rubber, Softening, spectrum
 from rig.physics.string import ElasticString
 
 if TYPE_CHECKING:
-    from sling2sim2real.settings import BandParams, Params
-    from sling2sim2real.settings.virtual_rig import RigBand, RigSoftening
+    from pipeline.params import BandParams, Params
+    from pipeline.params.virtual_rig import RigBand, RigSoftening
 
 HISTORY_STEP = 0.01
 

@@ -16,7 +16,7 @@ from rig.physics.scene import Mesh
 from rig.recorder.sensors import direction
 
 if TYPE_CHECKING:
-    from sling2sim2real.settings.virtual_rig import RigCamera
+    from pipeline.params.virtual_rig import RigCamera
 
 WIDTH, HEIGHT = 640, 480
 RATE = 30.0  # Hz

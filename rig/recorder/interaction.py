@@ -15,7 +15,7 @@ from rig.physics.world import bent_at
 from sling2sim2real.base.errors import UserError
 
 if TYPE_CHECKING:
-    from sling2sim2real.settings import Params
+    from pipeline.params import Params
 
 
 @dataclass(frozen=True)

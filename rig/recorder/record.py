@@ -11,6 +11,7 @@ import numpy as np
 from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
+from pipeline.params.run import PLAIN
 from rig.physics.draw import sampled
 from rig.physics.motion import HandMotion
 from rig.physics.robot import SENSOR_LEVER, Robot
@@ -23,11 +24,10 @@ from rig.recorder.interaction import Interaction, hang, pull_and_release
 from rig.recorder.mcap_writer import BagWriter
 from rig.recorder.sensors import wrench
 from sling2sim2real.base.files import replacing
-from sling2sim2real.settings.run import PLAIN
 
 if TYPE_CHECKING:
-    from sling2sim2real.settings import Params
-    from sling2sim2real.settings.virtual_rig import RigClock
+    from pipeline.params import Params
+    from pipeline.params.virtual_rig import RigClock
 
 EPOCH = 1_760_000_000_000_000_000  # ns, when the recording starts
 SENSOR_RATE, GRIPPER_RATE = 1000, 50  # Hz

@@ -10,8 +10,8 @@ from rig.physics.robot import SENSOR_LEVER, Robot
 from rig.physics.string import GRAVITY
 
 if TYPE_CHECKING:
+    from pipeline.params.virtual_rig import RigWrench
     from rig.recorder.interaction import Interaction
-    from sling2sim2real.settings.virtual_rig import RigWrench
 
 TOOL_CENTER = 0.4  # of the way from the sensor to the tool centre point
 

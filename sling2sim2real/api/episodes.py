@@ -10,11 +10,11 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from sling2sim2real.api.model import Band, with_band
-from sling2sim2real.api.settings import Settings
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode import signal
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.window import window_of
+from sling2sim2real.settings import Settings
 
 VELOCITY_WINDOW = 0.05  # s of the local cubic fits that are differentiated
 LEAST_PULL = 0.5  # N

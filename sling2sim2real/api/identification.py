@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from sling2sim2real.api.model import Band, Model, Theta, with_band
-from sling2sim2real.api.settings import Settings
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_json
 from sling2sim2real.base.layout import Layout, NotMade
@@ -35,6 +34,7 @@ from sling2sim2real.identification.results.theta import (
 from sling2sim2real.identification.results.units import SI_UNITS
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.stretch import recorded_stretch
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.settings.provenance import changed_since
 from sling2sim2real.simulator.model import ClampedBand, LaunchHistory, LaunchSetup

@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[2]
 CODE = ("pipeline/", "rig/", "stages/", "sling2sim2real/", "validation/")
 UNTRACKED = (  # nobody's dependency: see tools/closure.py
     "sling2sim2real/settings/",
+    "pipeline/params/",
     "pipeline/layout.py",
     "stages/start.py",
 )

@@ -13,7 +13,7 @@ from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.phases import NO_UNLOADING, phases_of_hand, unseen
 from sling2sim2real.launching.trials.spread import LEVEL
 from sling2sim2real.quantities import QUANTITIES, rounded
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 OUTSIDE = float(ndtri((1 + LEVEL) / 2))  # standard deviations: beyond the interval
 NEARLY = 0.02  # m below the highest that the hand goes: it no longer lifts
@@ -106,7 +106,7 @@ def _known(value: float) -> float:
     return float(value) if np.isfinite(value) else 0.0
 
 
-def _density(params: Params, band: str) -> float | None:
+def _density(params: Settings, band: str) -> float | None:
     """Density of a band that somebody weighed [kg/m^3]; None for the rig's."""
     sizes = params.bands[band]
     return None if sizes.source == "rig" else sizes.density

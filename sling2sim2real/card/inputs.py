@@ -17,7 +17,7 @@ from sling2sim2real.launching.surface.simulator import simulator
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.spread import Spread, landing_spread
 from sling2sim2real.launching.trials.stretch import recorded_stretch, stretch_of
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.launch import Launches, limited
 from sling2sim2real.simulator.parameters import Parameters
 
@@ -85,7 +85,7 @@ class CardInputs:
         recorded_stretch: The largest of all pulls.
     """
 
-    params: Params
+    params: Settings
     band: str
     method: str
     files: CardFiles
@@ -120,7 +120,7 @@ class CardInputs:
         return self.trials.loc[self.trials.landing_y.notna() & self.trials.predicted_y.notna()]
 
 
-def card_inputs(params: Params, band: str, method: str, files: CardFiles) -> CardInputs:
+def card_inputs(params: Settings, band: str, method: str, files: CardFiles) -> CardInputs:
     """Read and launch. Raises UserError where an input is missing."""
     band_params = params.bands[band]
     theta = load_theta(files.theta, band)
@@ -155,7 +155,7 @@ def aims(
     draw: np.ndarray,
     samples: Parameters | None,
     stretch: Callable[[np.ndarray], np.ndarray],
-    params: Params,
+    params: Settings,
 ) -> Aims:
     """Launch draws (T, 2) at targets (T,), with the best θ and with samples of it.
 

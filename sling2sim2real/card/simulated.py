@@ -12,7 +12,7 @@ from sling2sim2real.card.inputs import CardFiles
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.posterior.likelihood import opening_time
 from sling2sim2real.identification.results.theta import calibrated, parameters_of
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.replay import replay
 
 COARSE, FINE = 1 / 30, 1e-3  # s between states, around the release FINE
@@ -59,7 +59,7 @@ def smooth(place: np.ndarray, nodes: np.ndarray) -> np.ndarray:
 
 
 def simulate(
-    params: Params, band: str, episode: Episode, theta: dict, files: CardFiles
+    params: Settings, band: str, episode: Episode, theta: dict, files: CardFiles
 ) -> Simulated:
     """Play the pull with a θ file's content, its release and its camera's clock as identified.
 

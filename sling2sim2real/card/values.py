@@ -9,7 +9,7 @@ import numpy as np
 
 from sling2sim2real.identification.posterior.coordinates import MOST_DRAG, MOST_LOST
 from sling2sim2real.quantities import QUANTITIES, rounded
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.parameters import EXTRA
 
 
@@ -77,7 +77,7 @@ class SearchedRange(NamedTuple):
         return float((ends[0] - ends[1]) / (ends[2] - ends[1]))
 
 
-def boxes(params: Params, method: str) -> dict[str, SearchedRange]:
+def boxes(params: Settings, method: str) -> dict[str, SearchedRange]:
     """Ranges of what a method searches, by name."""
     config = params.methods[method]
     ranges = {name: SearchedRange(box.low, box.high, box.scale) for name, box in params.parameters}

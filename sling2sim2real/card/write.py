@@ -17,10 +17,10 @@ from sling2sim2real.card.simulated import simulate
 from sling2sim2real.card.text import card_text
 from sling2sim2real.card.values import boxes
 from sling2sim2real.drawing.page import page
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 
-def write(params: Params, band: str, method: str, files: CardFiles, card_folder: Path) -> dict:
+def write(params: Settings, band: str, method: str, files: CardFiles, card_folder: Path) -> dict:
     """Write a band's card; return what card.json says. Raises UserError: an input is missing."""
     inputs = card_inputs(params, band, method, files)
     episode, setup = inputs.episode, params.setup

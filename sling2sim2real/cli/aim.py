@@ -7,6 +7,7 @@ from typing import NotRequired, TypedDict, cast
 
 import numpy as np
 
+from pipeline.params import Params
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli import safety
 from sling2sim2real.cli.launch import interval_90, pull_and_pause
@@ -15,7 +16,7 @@ from sling2sim2real.identification.results.theta import load_samples, load_theta
 from sling2sim2real.launching.surface.landing_map import Launcher
 from sling2sim2real.launching.surface.simulator import simulator
 from sling2sim2real.launching.surface.stored import Stored
-from sling2sim2real.settings import Params, expect_known
+from sling2sim2real.settings import expect_known
 
 
 class Answer(TypedDict):

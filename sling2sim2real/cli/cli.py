@@ -140,9 +140,9 @@ def add_recording(arguments: argparse.Namespace) -> Done:
     JSON,
 )
 def check(arguments: argparse.Namespace) -> Done:
-    from sling2sim2real.api.settings import Settings
+    from pipeline.params import load
     from sling2sim2real.cli.preflight.command import check
-    from sling2sim2real.settings import load
+    from sling2sim2real.settings import Settings
 
     if arguments.frames and not arguments.json:
         arguments.refuse("argument --frames: used with --json alone")
@@ -218,8 +218,8 @@ def setup(arguments: argparse.Namespace) -> Done:
     JSON,
 )
 def plan(arguments: argparse.Namespace) -> Done:
+    from pipeline.params import load
     from sling2sim2real.cli.plan.plan import plan_recording, with_band
-    from sling2sim2real.settings import load
 
     sizes = arguments.mass, arguments.diameter, arguments.rest_length
     params, band = with_band(load(), arguments.band, *sizes)
@@ -249,8 +249,9 @@ def plan(arguments: argparse.Namespace) -> Done:
     JSON,
 )
 def launch(arguments: argparse.Namespace) -> Done:
+    from pipeline.params import load
     from sling2sim2real.cli import launch, safety
-    from sling2sim2real.settings import expect_known, load
+    from sling2sim2real.settings import expect_known
 
     params, method = load(), arguments.method or DEFAULT_METHOD
     if arguments.theta and arguments.method:
@@ -273,10 +274,10 @@ def launch(arguments: argparse.Namespace) -> Done:
     JSON,
 )
 def aim(arguments: argparse.Namespace) -> Done:
+    from pipeline.params import load
     from sling2sim2real.cli import safety
     from sling2sim2real.cli.aim import aim, why_refused
     from sling2sim2real.cli.pose import posed
-    from sling2sim2real.settings import load
 
     params, band = load(), arguments.band
     answer = aim(params, band, arguments.method, arguments.target)
@@ -309,8 +310,8 @@ def aim(arguments: argparse.Namespace) -> Done:
     JSON,
 )
 def observe(arguments: argparse.Namespace) -> Done:
+    from pipeline.params import load
     from sling2sim2real.cli import observe
-    from sling2sim2real.settings import load
 
     of_launch = {"--draw": arguments.draw, "--landing": arguments.landing}
     if arguments.undo:
@@ -351,8 +352,8 @@ def observe(arguments: argparse.Namespace) -> Done:
     JSON,
 )
 def export(arguments: argparse.Namespace) -> Done:
+    from pipeline.params import load
     from sling2sim2real.cli.export import export_of_run, shown
-    from sling2sim2real.settings import load
 
     band, method = arguments.band, arguments.method
     folder, card = export_of_run(load(), band, method, arguments.to, arguments.out)

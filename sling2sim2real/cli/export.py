@@ -10,11 +10,11 @@ from sling2sim2real.base.disk import expect_writable
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.exporting.card import HOLD, LANDING
-from sling2sim2real.settings import Params, expect_known
+from sling2sim2real.settings import Settings, expect_known
 
 
 def export_of_run(
-    params: Params, band: str, method: str, to: str, out: Path | None = None
+    params: Settings, band: str, method: str, to: str, out: Path | None = None
 ) -> tuple[Path, dict]:
     """Export a band of the working folder, as `sling fit` or `dvc repro` found it.
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.params import Params
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.layout import Layout, owner
 from sling2sim2real.cli import safety
@@ -19,7 +20,7 @@ from sling2sim2real.identification.results.theta import (
 from sling2sim2real.launching.surface.landing_map import Launcher
 from sling2sim2real.launching.surface.simulator import simulator
 from sling2sim2real.launching.trials.spread import landing_intervals
-from sling2sim2real.settings import Params, expect_known
+from sling2sim2real.settings import expect_known
 from sling2sim2real.simulator.launch import limited
 from sling2sim2real.simulator.parameters import Parameters
 

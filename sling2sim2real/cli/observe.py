@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.flow.dvc import repro
+from pipeline.params import Params
 from sling2sim2real.base.disk import expect_ready
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.layout import Layout, NotMade
@@ -21,7 +22,7 @@ from sling2sim2real.episode.pull import deepest_draw
 from sling2sim2real.identification.results.theta import load_samples, load_theta, parameters_of
 from sling2sim2real.launching.surface.simulator import simulator
 from sling2sim2real.launching.trials.spread import LEVEL
-from sling2sim2real.settings import Params, expect_known
+from sling2sim2real.settings import expect_known
 from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.rubber import RUBBER
 from stages.start import stage_of

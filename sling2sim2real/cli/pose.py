@@ -14,6 +14,7 @@ from typing import cast
 
 import numpy as np
 
+from pipeline.params import Params
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli.aim import Answer
@@ -22,7 +23,6 @@ from sling2sim2real.cli.safety import Hazard
 from sling2sim2real.episode.episode import read_metadata
 from sling2sim2real.recording.frames import EpisodeGeometry
 from sling2sim2real.recording.transforms import Transform
-from sling2sim2real.settings import Params
 from stages.start import stage_of
 
 

@@ -9,13 +9,14 @@ from pathlib import Path
 
 from ruamel.yaml.comments import CommentedMap
 
+from pipeline.params import Params, load
 from sling2sim2real.base.disk import expect_writable
 from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.base.files import write_text
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli.command_line import say
 from sling2sim2real.cli.params_file import edited
-from sling2sim2real.settings import expect_known, load, parse
+from sling2sim2real.settings import expect_known
 
 
 def remove_band(name: str, agreed: Callable[[list[str]], bool], root: Path | str = ".") -> str:
@@ -46,7 +47,7 @@ def remove_band(name: str, agreed: Callable[[list[str]], bool], root: Path | str
             " removes recorded bands alone"
         )
     text = edited(path.read_text("utf-8"), lambda content: _forget(content, name))
-    parse(text, str(path))
+    Params.parse(text, str(path))
     files = files_of(layout, name)
     expect_writable(path.parent, *files, *(file.parent for file in files))
     lines = [f"bands.{name} of {path}, and where run: names it", *map(str, files)]

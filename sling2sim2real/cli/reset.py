@@ -8,10 +8,10 @@ from pathlib import Path
 
 from ruamel.yaml import YAML, YAMLError
 
+from pipeline.params import Params
 from sling2sim2real.base.errors import UserError, one_line
 from sling2sim2real.base.files import write_text
 from sling2sim2real.cli.params_file import edited
-from sling2sim2real.settings import parse
 
 YOURS = (("bands",), ("run", "own"), ("setup",), ("plan",))  # of a lab, not of an experiment
 Key = tuple[str, ...]
@@ -53,7 +53,7 @@ def reset(keys: Sequence[str], path: Path | str = "params.yaml") -> list[str]:
     if not changed:
         return []
     back = edited(text, lambda content: [_set(content, *change) for change in changed.items()])
-    parse(back, str(path))
+    Params.parse(back, str(path))
     write_text(path, back)
     return [f"{'.'.join(k)} was {_value(now, k)}, is {v} again" for k, v in changed.items()]
 

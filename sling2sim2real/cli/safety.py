@@ -10,13 +10,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from pipeline.params import Params
 from sling2sim2real.base.layout import Layout, NotMade, owner
 from sling2sim2real.card.verdict import FEW_SAMPLES
 from sling2sim2real.cli import arguments
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.stretch import recorded_stretch, stretch_of
-from sling2sim2real.settings import Params
 from sling2sim2real.settings.provenance import Change, changed_since, changes, policy_settings_of
 from stages.start import stage_of, unmounted
 

@@ -17,6 +17,7 @@ import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from scipy.spatial.transform import Rotation
 
+from pipeline.params import Params, load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_text
 from sling2sim2real.cli.arguments import MEASURED
@@ -24,7 +25,6 @@ from sling2sim2real.cli.command_line import say
 from sling2sim2real.cli.params_file import edited
 from sling2sim2real.recording.frames import SURE, TOUCH, Loop
 from sling2sim2real.recording.transforms import Transform
-from sling2sim2real.settings import load, parse
 from sling2sim2real.settings.lab import SetupParams
 
 UPRIGHT = (0.0, 0.0, 1.0)
@@ -132,7 +132,7 @@ def set_up(
         if _plain(old[key]) != _plain(value)
     }
     text = edited(path.read_text(encoding="utf-8"), lambda content: _put(content["setup"], changed))
-    parse(text, str(path))
+    Params.parse(text, str(path))
     content = {"changed": changed, "checked": checked, "written": False}
     if changed and agreed(shown({**content, "written": True})):
         write_text(path, text)

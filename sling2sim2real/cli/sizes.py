@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import BandParams
 
 DIAMETER, REST_LENGTH = 0.010, 0.52  # m: of a common band, where nothing is given
@@ -11,7 +11,7 @@ MASS = 0.03  # kg: stands for what is not known, and nothing is judged by it
 
 
 def band_to_come(
-    params: Params,
+    params: Settings,
     mass: float | None = None,
     diameter: float | None = None,
     rest_length: float | None = None,

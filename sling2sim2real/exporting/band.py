@@ -9,7 +9,7 @@ import numpy as np
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.planned import planned_pull
 from sling2sim2real.identification.results.mounting import Mounting
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.initial import hanging_guess
 from sling2sim2real.simulator.launch import Launches
 from sling2sim2real.simulator.model import BandSizes, ClampedBand, LaunchSetup
@@ -33,7 +33,7 @@ class CalibratedBand(Protocol):
     @property
     def mounting(self) -> Mounting | None: ...
     @property
-    def settings(self) -> Params: ...
+    def settings(self) -> Settings: ...
     @property
     def sling(self) -> ClampedBand: ...
     @property

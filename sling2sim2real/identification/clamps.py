@@ -19,7 +19,7 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.phases import taut_time
 from sling2sim2real.identification.objective.loss import EpisodeLoss
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.interaction import interact
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
@@ -95,7 +95,7 @@ class ClampCalibration:
 
 
 def calibrate_clamps(
-    params: Params, sling: ClampedBand, episode: Episode, *, workers: int
+    params: Settings, sling: ClampedBand, episode: Episode, *, workers: int
 ) -> ClampCalibration:
     """Fit the clamps' angle and the flexural rigidity to the slack part of an episode.
 

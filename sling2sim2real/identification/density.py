@@ -10,14 +10,14 @@ from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.identification.posterior.identify import Identified, confidence, theta_entries
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import EXTRA
 
 
 def evaluated_mode(
-    params: Params, method: str, sling: ClampedBand, episode: Episode, density: Identified
+    params: Settings, method: str, sling: ClampedBand, episode: Episode, density: Identified
 ) -> Evaluations:
     """The mode's loss, one row of the phase `posterior`."""
     mode = density.mode.sample()

@@ -19,7 +19,7 @@ from sling2sim2real.identification.posterior.launches import Evidence
 from sling2sim2real.identification.search import explore
 from sling2sim2real.identification.searches.cma_es import refine
 from sling2sim2real.identification.searches.regions import regions_of
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
@@ -41,7 +41,7 @@ class IdentifiedBand:
 
 
 def evaluations_of(
-    params: Params, method: str, evaluate: Callable[[np.ndarray], Evaluation]
+    params: Settings, method: str, evaluate: Callable[[np.ndarray], Evaluation]
 ) -> Evaluations:
     """Everything that the search of a method evaluates: exploration, then refinement if it has one.
 
@@ -59,7 +59,7 @@ def evaluations_of(
 
 
 def search_and_fit(
-    params: Params,
+    params: Settings,
     method: str,
     sling: ClampedBand,
     episodes: Sequence[Episode],

@@ -19,7 +19,7 @@ from sling2sim2real.base.imported import imported
 from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.objective.box import SearchBox, latin_hypercube
 from sling2sim2real.identification.objective.evaluate import Evaluation, Penalty
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import POSTERIOR
 
 FOLDER = "sling2sim2real.identification.searches"
@@ -105,7 +105,7 @@ def _checked(unit: np.ndarray, dimension: int, name: str) -> np.ndarray:
     )
 
 
-def rollouts_of(params: Params, method: str) -> int:
+def rollouts_of(params: Settings, method: str) -> int:
     """How many points a method explores.
 
     A search of one phase has the rollouts of a refinement too: all methods spend the same.
@@ -118,7 +118,7 @@ def rollouts_of(params: Params, method: str) -> int:
 
 
 def explore(
-    params: Params, method: str, evaluate: Callable[[np.ndarray], Evaluation]
+    params: Settings, method: str, evaluate: Callable[[np.ndarray], Evaluation]
 ) -> Evaluations:
     """Everything that the first search of a method evaluates; of most methods it is the only one.
 

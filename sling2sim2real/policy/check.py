@@ -10,7 +10,7 @@ import numpy as np
 from sling2sim2real.launching.surface.landing_map import Launcher
 from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE
 from sling2sim2real.policy.train import CHECKED_TARGETS, Policy, Trained
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 CONVERGED = 0.01  # mean |y_p - g| [m] over the checked targets that counts as converged
 CRITERION = (
@@ -33,7 +33,7 @@ class PolicyCheck:
     failures: dict[str, int]
 
 
-def check(policy: Policy, launcher: Launcher, params: Params) -> PolicyCheck:
+def check(policy: Policy, launcher: Launcher, params: Settings) -> PolicyCheck:
     """Launch the policy's draws for targets spread over the trained range, as they are.
 
     Args:

@@ -18,7 +18,7 @@ from torch import nn
 
 from sling2sim2real.base.files import replacing, write_json
 from sling2sim2real.policy.train import Policy, Trained
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.provenance import policy_settings_of
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 
@@ -30,7 +30,7 @@ USED = ("sling2sim2real", "torch", "rsl-rl-lib", "onnx", "numpy")
 
 
 def export(
-    trained: Trained, folder: Path, params: Params, band: str, method: str, theta: dict, **more
+    trained: Trained, folder: Path, params: Settings, band: str, method: str, theta: dict, **more
 ) -> None:
     """Write a policy's files into `folder`: network and curve, and last its card.
 
@@ -104,7 +104,7 @@ def write_onnx(policy: Policy, path: Path) -> None:
 
 def card(
     policy: Policy,
-    params: Params,
+    params: Settings,
     band: str,
     method: str,
     theta: dict,

@@ -27,7 +27,7 @@ from sling2sim2real.recording.frames import EpisodeGeometry, geometry_of
 from sling2sim2real.recording.scene import Scene, View
 from sling2sim2real.recording.signals import Signals, signals_of
 from sling2sim2real.recording.streams import explained, read_recording
-from sling2sim2real.settings import Params, expect_known
+from sling2sim2real.settings import Settings, expect_known
 from sling2sim2real.settings.lab import BandParams
 
 
@@ -92,7 +92,7 @@ class Processed:
 
 
 def build_episodes(
-    path: Path, band_name: str, params: Params
+    path: Path, band_name: str, params: Settings
 ) -> tuple[list[Episode], list[UserError]]:
     """The episodes of a recording's pulls, in time order, and why others have none, a line each.
 
@@ -105,7 +105,7 @@ def build_episodes(
 
 
 def process_recording(
-    path: Path, band: BandParams, params: Params
+    path: Path, band: BandParams, params: Settings
 ) -> tuple[list[Processed], list[UserError]]:
     """As `build_episodes`, with every step's result."""
     recording = read_recording(path, params.setup, params.episode.delays)
@@ -128,7 +128,7 @@ def process_recording(
     return usable, refused
 
 
-def process(part: Part, band: BandParams, params: Params, weighed: bool = True) -> Processed:
+def process(part: Part, band: BandParams, params: Settings, weighed: bool = True) -> Processed:
     """One pull, step by step, up to the end or to what refuses it.
 
     Args:
@@ -143,7 +143,7 @@ def process(part: Part, band: BandParams, params: Params, weighed: bool = True) 
     return done
 
 
-def _process(done: Processed, band: BandParams, params: Params, weighed: bool) -> None:
+def _process(done: Processed, band: BandParams, params: Settings, weighed: bool) -> None:
     """Topics, events, delays, signals, pictures, with three check points. Raises UserError."""
     part, setup = done.part, params.setup
     done.check(checks.of_topics(part))

@@ -26,7 +26,7 @@ from sling2sim2real.recording.scene import Scene
 from sling2sim2real.recording.signals import Signals
 from sling2sim2real.recording.streams import Stream
 from sling2sim2real.recording.transforms import Transform
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import BandParams
 
 SURE = 3.0  # standard errors from which a delay, a direction, a place is off
@@ -318,7 +318,7 @@ def of_signals(
     signals: Signals,
     scene: Scene,
     band: BandParams,
-    params: Params,
+    params: Settings,
     weighed: bool,
 ) -> Iterator[Finding]:
     """What force, hand and their clocks tell."""

@@ -32,7 +32,7 @@ from sling2sim2real.recording.events import Pull
 from sling2sim2real.recording.force import ToolInertia, estimate_tool_inertia
 from sling2sim2real.recording.release_pictures import ReleasePictures, release_pictures
 from sling2sim2real.recording.start_back import start_back
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 Found = TypeVar("Found")
 SIGMAS = 3.0  # what is less sure than this is not corrected
@@ -116,7 +116,7 @@ class Delays:
     conflict: str = ""
 
 
-def correct_delays(pull: Pull, params: Params) -> tuple[Pull, Delays]:
+def correct_delays(pull: Pull, params: Settings) -> tuple[Pull, Delays]:
     """The pull with the stamps that it should have had, and by what they were late.
 
     Given delays are taken off first, when the recording is read; what it shows of the rest is

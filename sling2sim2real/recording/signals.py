@@ -15,7 +15,7 @@ from sling2sim2real.recording.force import ToolInertia, band_force
 from sling2sim2real.recording.frames import turned
 from sling2sim2real.recording.grasp import MARGIN
 from sling2sim2real.recording.motion import Motion, expect_dense, interpolated
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import Tool
 from sling2sim2real.settings.recording import EpisodeParams
 
@@ -115,7 +115,7 @@ class Signals:
         return float(np.nan_to_num(np.interp(time, self.time, self.opening)))
 
 
-def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -> Signals:
+def signals_of(pull: Pull, params: Settings, inertia: ToolInertia | None = None) -> Signals:
     """Turn raw streams into samples. Raises UserError if the recording cannot be used.
 
     Args:

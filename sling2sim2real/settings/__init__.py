@@ -1,23 +1,19 @@
-"""Typed view of params.yaml: `load()` refuses unknown keys, wrong types and impossible values.
-
-Attribute names are the keys of the file. Ranges say what makes physical or numerical sense, wide
-enough for any lab. Every violation is a UserError of one line that names the key's path.
-"""
+"""Settings: everything that a result depends on beside the data, with its default."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import ClassVar, Self
 
 from pydantic import ValidationError, model_validator
 from ruamel.yaml import YAML, YAMLError
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.schema import FILLED, Name, Section, explained, refusal
+from sling2sim2real.base.schema import Name, Section, explained, refusal
 from sling2sim2real.base.target import TARGET_AREA
 from sling2sim2real.settings.identification import (
-    OWN,
-    SEARCHES,
+    METHODS,
     LossParams,
     MethodDefaults,
     MethodParams,
@@ -27,31 +23,126 @@ from sling2sim2real.settings.identification import (
     check_method,
 )
 from sling2sim2real.settings.lab import BandParams, PlanParams, SetupParams
-from sling2sim2real.settings.launches import FloorParams, LaunchParams, PolicyParams, TrialsParams
+from sling2sim2real.settings.launches import LaunchParams, PolicyParams, TrialsParams
 from sling2sim2real.settings.recording import CloudParams, EpisodeParams, ForceParams
-from sling2sim2real.settings.run import UNIONS, RunParams
-from sling2sim2real.settings.virtual_rig import RigParams
+
+COARSE = {
+    "sling": {
+        "edges": 16,
+        "grip_step": 0.01,
+        "recoil_step": 5e-4,
+        "swing_step": 2e-3,
+        "launch_step": 5e-4,
+    },
+    "optimizer": {"population": 16, "generations": 1, "k_nn": 15},
+    "policy": {"map_size": [9, 7]},
+}
 
 
-class Params(Section):
-    run: RunParams
-    bands: Annotated[dict[Name, BandParams], FILLED]
-    setup: SetupParams
-    plan: PlanParams
-    episode: EpisodeParams
-    force: ForceParams
-    cloud: CloudParams
-    sling: SlingParams
-    parameters: ParameterBoxes
-    loss: LossParams
-    optimizer: OptimizerParams
-    method_defaults: MethodDefaults
-    methods: Annotated[dict[Name, MethodParams], FILLED]
-    policy: PolicyParams
-    launch: LaunchParams
-    trials: TrialsParams
-    floor: FloorParams
-    rig: RigParams
+class Settings(Section):
+    """Everything that a result depends on beside the data: sections and keys are params.yaml's.
+
+    Bands are not among them: functions are given theirs. SI units; params.yaml says what each key
+    means. Frozen; `changed` gives another one. A wrong key or value is a UserError of one line that
+    names it.
+
+    >>> from sling2sim2real import Settings
+    >>> settings = Settings.default(setup={"fork_width": 0.30})
+    >>> settings.setup.fork_width, settings.setup.fork_height
+    (0.3, 0.52)
+    >>> settings.changed(setup={"fork_widht": 0.30})
+    Traceback (most recent call last):
+    ...
+    sling2sim2real.base.errors.UserError: settings: setup.fork_widht: unknown key, ...
+    """
+
+    passed_over: ClassVar[tuple[str, ...]] = ("run", "floor", "rig")  # of an experiment's file
+
+    setup: SetupParams = SetupParams()
+    plan: PlanParams = PlanParams()
+    episode: EpisodeParams = EpisodeParams()
+    force: ForceParams = ForceParams()
+    cloud: CloudParams = CloudParams()
+    sling: SlingParams = SlingParams()
+    parameters: ParameterBoxes = ParameterBoxes()
+    loss: LossParams = LossParams()
+    optimizer: OptimizerParams = OptimizerParams()
+    method_defaults: MethodDefaults = MethodDefaults()
+    methods: dict[Name, MethodParams] = METHODS
+    policy: PolicyParams = PolicyParams()
+    launch: LaunchParams = LaunchParams()
+    trials: TrialsParams = TrialsParams()
+    bands: dict[Name, BandParams] = {}
+
+    @classmethod
+    def default(cls, **changes: Mapping) -> Self:
+        """The defaults, with `changes`.
+
+        >>> Settings.default(sling={"edges": 48}).sling.edges
+        48
+        """
+        return cls.checked(changes)
+
+    @classmethod
+    def coarse(cls, **changes: Mapping) -> Self:
+        """The same for first tries and tests: coarser simulations, a smaller search and map.
+
+        Landings move by about a centimetre; do not publish what it gives.
+
+        >>> Settings.coarse().sling.edges
+        16
+        """
+        return cls.default(**_merged(COARSE, changes))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Settings of a YAML file; what it leaves out is the default.
+
+        It may be an experiment's params.yaml, whose other sections are passed over.
+
+        Raises:
+            UserError: It cannot be read, or a key is wrong.
+        """
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+        except FileNotFoundError as error:
+            raise UserError(f"{path}: no such file") from error
+        except (OSError, UnicodeDecodeError) as error:
+            reason = getattr(error, "strerror", None) or "not UTF-8 text"
+            raise UserError(f"{path}: cannot be read ({reason})") from error
+        return cls.parse(text, str(path))
+
+    @classmethod
+    def parse(cls, text: str, name: str = "params.yaml") -> Self:
+        """Settings of a YAML text; `name` stands in error messages. Raises UserError."""
+        try:
+            content = YAML(typ="safe").load(text)  # the parser that DVC uses
+        except (YAMLError, ValueError, RecursionError) as error:
+            mark = getattr(error, "problem_mark", None)
+            where = f", line {mark.line + 1}" if mark else ""
+            what = getattr(error, "problem", None) or str(error).partition("\n")[0]
+            raise UserError(f"{name}{where}: not valid YAML ({what})") from error
+        if isinstance(content, Mapping):
+            content = {key: it for key, it in content.items() if key not in cls.passed_over}
+        return cls.checked(content, name)
+
+    @classmethod
+    def checked(cls, content: object, name: str = "settings") -> Self:
+        """Settings of sections and keys; `name` stands in error messages. Raises UserError."""
+        if not isinstance(content, Mapping):
+            raise UserError(f"{name}: must hold a mapping of sections such as `setup:`")
+        try:
+            return cls.model_validate(content)
+        except ValidationError as error:
+            raise UserError(f"{name}: {explained(error, cls)}") from error
+
+    def changed(self, **changes: Mapping) -> Self:
+        """These settings with other values: `settings.changed(force={"cutoff": 0.1})`.
+
+        >>> Settings.default().changed(trials={"actuation_error": 0.0}).trials.actuation_error
+        0.0
+        """
+        return self.checked(_merged(self.model_dump(), changes))
 
     @model_validator(mode="before")
     @classmethod
@@ -69,50 +160,7 @@ class Params(Section):
         return content | {"methods": whole}
 
     @model_validator(mode="after")
-    def _names_agree(self) -> Params:
-        run = self.run
-        for key, names, defined in (
-            ("run.recordings", [entry.band for entry in run.recordings.values()], self.bands),
-            ("run.pairs", [pair.method for pair in run.pairs.values()], self.methods),
-        ):
-            for name in names:
-                if name not in defined:
-                    raise refusal(f"{key}: {name} is not one of {', '.join(defined)}")
-        for key, recording in run.recordings.items():
-            if (self.bands[recording.band].source == "rig") != (key in run.rig):
-                where = "recordings alone" if key in run.rig else "rig"
-                source = self.bands[recording.band].source
-                raise refusal(f"run.{where}: wants {key}, whose band has source: {source}")
-        for recording in run.rig.values():
-            for name, defined in (("bands", self.rig.bands), ("recordings", self.rig.recordings)):
-                wanted = recording.band if name == "bands" else recording.recording
-                if wanted not in defined:
-                    raise refusal(f"rig.{name}: lacks {wanted}, which the rig is to record")
-        for band in run.floors:
-            if band not in self.rig.bands or band not in self.bands:
-                raise refusal(f"run.floors: {band} is no band of the rig")
-        return self
-
-    @model_validator(mode="after")
-    def _pairs_go_through_the_steps_of_their_search(self) -> Params:
-        for kind in UNIONS["pairs"]:
-            for key, pair in getattr(self.run, kind).items():
-                search = self.methods[pair.method].search
-                wanted = search if search in UNIONS["explored"] else "search"
-                if kind != wanted:
-                    raise refusal(
-                        f"run.{kind}: {key} belongs under run.{wanted}, for methods.{pair.method}"
-                        f" has search: {search}"
-                    )
-                code = (search if search in SEARCHES else OWN) if kind == "search" else None
-                if pair.search != code:
-                    raise refusal(
-                        f"run.{kind}.{key}.search: must be {code or 'left out'}: whose code it runs"
-                    )
-        return self
-
-    @model_validator(mode="after")
-    def _sections_fit(self) -> Params:
+    def _sections_fit(self) -> Settings:
         for name, method in self.methods.items():
             check_method(method, f"methods.{name}.", self.parameters, self.optimizer)
         if self.setup.foot_height >= self.setup.fork_height:
@@ -128,7 +176,7 @@ class Params(Section):
         return self
 
     @model_validator(mode="after")
-    def _trials_are_trained(self) -> Params:
+    def _trials_are_trained(self) -> Settings:
         low, high = self.policy.targets
         for target in self.trials.targets:
             if not low <= target <= high:
@@ -143,44 +191,19 @@ class Params(Section):
         return self
 
 
-def expect_known(params: Params, kind: str, name: str, called: str | None = None) -> None:
+def _merged(old: Mapping, changes: Mapping) -> dict:
+    """Mappings key by key, at any depth; what is new wins."""
+    merged = dict(old)
+    for key, value in changes.items():
+        both = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
+        merged[key] = _merged(merged[key], value) if both else value
+    return merged
+
+
+def expect_known(settings: Settings, kind: str, name: str, called: str | None = None) -> None:
     """Raises UserError where there is no such `kind`, band or method; `called` names it."""
-    defined = getattr(params, f"{kind}s")
+    defined = getattr(settings, f"{kind}s")
     if name not in defined:
         raise UserError(
             f"{called or kind} {name}: not in params.yaml, which has {', '.join(defined)}"
         )
-
-
-def load(path: str | Path = "params.yaml") -> Params:
-    """Read and check params.yaml. Raises UserError."""
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise UserError(f"{path}: no such file; run this in the project's folder") from error
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8 text"
-        raise UserError(f"{path}: cannot be read ({reason})") from error
-    return parse(text, str(path))
-
-
-def parse(text: str, name: str = "params.yaml") -> Params:
-    """Check the text of a params.yaml; `name` stands in error messages. Raises UserError."""
-    try:
-        content = YAML(typ="safe").load(text)  # the parser that DVC uses
-    except (YAMLError, ValueError, RecursionError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f", line {mark.line + 1}" if mark else ""
-        what = getattr(error, "problem", None) or str(error).partition("\n")[0]
-        raise UserError(f"{name}{where}: not valid YAML ({what})") from error
-    return check(content, name)
-
-
-def check(content: object, name: str = "params.yaml") -> Params:
-    """Check what a params.yaml holds; `name` stands in error messages. Raises UserError."""
-    if not isinstance(content, dict):
-        raise UserError(f"{name}: must hold a mapping of sections such as `run:` and `bands:`")
-    try:
-        return Params.model_validate(content)
-    except ValidationError as error:
-        raise UserError(f"{name}: {explained(error, Params)}") from error

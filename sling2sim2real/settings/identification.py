@@ -26,7 +26,7 @@ LAWS: dict[str, dict[str, tuple[float, float]]] = {
     },
     "corotated": {},
 }
-POSTERIOR = "posterior"
+POSTERIOR, PAPER = "posterior", "paper"
 UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
 SEARCHES = ("multistart", POSTERIOR, "de", "bo", "adam")
 OWN = "own"  # any other: a function of the user's
@@ -35,15 +35,15 @@ ENGINES = OUR_ENGINE, "physx"
 
 
 class SlingParams(Section):
-    edges: Annotated[int, Range(4, 400)]
-    grading: Annotated[float, Range(1, 20)]
-    grip_step: Step
-    hold_step: Step
-    recoil_step: Step
-    recoil_time: Annotated[float, Range(1e-3, 10)]
-    swing_step: Step
-    launch_step: Step
-    launch_time: Annotated[float, Range(0.01, 10)]
+    edges: Annotated[int, Range(4, 400)] = 24
+    grading: Annotated[float, Range(1, 20)] = 8.0
+    grip_step: Step = 0.005
+    hold_step: Step = 0.02
+    recoil_step: Step = 0.00025
+    recoil_time: Annotated[float, Range(1e-3, 10)] = 0.1
+    swing_step: Step = 0.001
+    launch_step: Step = 0.00025
+    launch_time: Annotated[float, Range(0.01, 10)] = 0.5
 
     @model_validator(mode="after")
     def _middle_is_a_layer(self) -> SlingParams:
@@ -76,16 +76,22 @@ DampingScale = Annotated[float, Range(0, 1)]
 
 
 class ParameterBoxes(Section):
-    youngs_modulus: Box[YoungsModulus]
-    poissons_ratio: Box[PoissonsRatio]
-    elasticity_damping: Box[ElasticityDamping]
-    dynamic_friction: Box[DynamicFriction]
-    damping_scale: Box[DampingScale]
+    youngs_modulus: Box[YoungsModulus] = Box[YoungsModulus](
+        low=30000.0, high=10000000.0, scale="log"
+    )
+    poissons_ratio: Box[PoissonsRatio] = Box[PoissonsRatio](low=0.3, high=0.49, scale="linear")
+    elasticity_damping: Box[ElasticityDamping] = Box[ElasticityDamping](
+        low=0.0001, high=0.05, scale="log"
+    )
+    dynamic_friction: Box[DynamicFriction] = Box[DynamicFriction](
+        low=0.05, high=1.0, scale="linear"
+    )
+    damping_scale: Box[DampingScale] = Box[DampingScale](low=0.0, high=1.0, scale="linear")
 
 
 class LossParams(Section):
-    chamfer: Literal["symmetric", "clouds"]
-    median_window: Annotated[int, Range(1, 101)]
+    chamfer: Literal["symmetric", "clouds"] = "symmetric"
+    median_window: Annotated[int, Range(1, 101)] = 7
 
     @model_validator(mode="after")
     def _window_has_a_middle(self) -> LossParams:
@@ -98,16 +104,16 @@ Factor = Annotated[float, Range(0, 1.99)]  # SciPy's differential evolution want
 
 
 class OptimizerParams(Section):
-    seed: Seed
-    population: Annotated[int, Range(5, 100_000)]
-    generations: Annotated[int, Range(1, 100_000)]
-    mutation: Annotated[tuple[Factor, Factor], LIST, ASCENDING]
-    recombination: Annotated[float, Range(0, 1)]
-    k_top: KTop
-    k_nn: Annotated[int, Range(6, 10_000)]  # a covariance of five parameters needs six points
-    delta: Annotated[float, Range(1e-3, 2)]
-    cma_population: Annotated[int, Range(4, 10_000)]
-    cma_rollouts: Annotated[int, Range(4, 10_000_000)]
+    seed: Seed = 1
+    population: Annotated[int, Range(5, 100_000)] = 20
+    generations: Annotated[int, Range(1, 100_000)] = 8
+    mutation: Annotated[tuple[Factor, Factor], LIST, ASCENDING] = (0.5, 1.0)
+    recombination: Annotated[float, Range(0, 1)] = 0.7
+    k_top: KTop = 5
+    k_nn: Annotated[int, Range(6, 10_000)] = 15  # a covariance of five parameters needs six points
+    delta: Annotated[float, Range(1e-3, 2)] = 0.1
+    cma_population: Annotated[int, Range(4, 10_000)] = 8
+    cma_rollouts: Annotated[int, Range(4, 10_000_000)] = 420
 
     @model_validator(mode="after")
     def _budgets_suffice(self) -> OptimizerParams:
@@ -124,9 +130,9 @@ Weight = Annotated[float, Range(0, 1e6)]
 
 
 class Weights(Section):
-    geom: Weight
-    force: Weight
-    work: Weight
+    geom: Weight = 1.0
+    force: Weight = 1.0
+    work: Weight = 1.0
 
     @model_validator(mode="after")
     def _something_counts(self) -> Weights:
@@ -160,21 +166,21 @@ Bounds = Annotated[tuple[Value, Value], LIST]
 class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
-    law: Law
-    search: Annotated[str, _one_of(SEARCHES, "function")]
-    engine: Annotated[str, _one_of(ENGINES, "function")]
-    settings: dict[str, Setting]
-    fixed: dict[str, Value]
-    bounds: dict[str, Bounds]
-    k_top: KTop | None
-    mounting: bool
-    covariance: bool
+    law: Law = "neo_hookean"
+    search: Annotated[str, _one_of(SEARCHES, "function")] = "multistart"
+    engine: Annotated[str, _one_of(ENGINES, "function")] = "sling"
+    settings: dict[str, Setting] = {}
+    fixed: dict[str, Value] = {}
+    bounds: dict[str, Bounds] = {}
+    k_top: KTop | None = None
+    mounting: bool = True
+    covariance: bool = True
 
 
 class MethodParams(MethodDefaults):
     """What is weighed, what is searched, and how."""
 
-    weights: Weights
+    weights: Weights = Weights()
 
     @model_validator(mode="after")
     def _keys_belong_to_the_search(self) -> MethodParams:
@@ -212,6 +218,24 @@ class MethodParams(MethodDefaults):
                     f" {self.law} searches"
                 )
         return self
+
+
+METHODS = {
+    PAPER: MethodParams(),  # the paper's
+    POSTERIOR: MethodParams(  # ours: the mode of one density over all recordings and launches
+        search=POSTERIOR,
+        law="rubber",
+        fixed={"poissons_ratio": 0.47, "dynamic_friction": 0.8, "damping_scale": 0.6},
+        bounds={
+            "mooney_share": (-0.3, 0.9),
+            "upturn": (0.0, 0.3),
+            "softening": (0.0, 0.6),
+            "relaxation": (0.0, 0.2),
+            "flow": (0.0, 0.6),
+            "log_flow_rate": (0.0, 5.0),
+        },
+    ),
+}
 
 
 def parameter_names(law: str) -> tuple[str, ...]:

@@ -46,13 +46,13 @@ class BandParams(Section):
 
 
 class Topics(Section):
-    wrench: str | None
-    pose: str | None
-    gripper: str | None
-    color: str | None
-    depth: str | None
-    color_info: str | None
-    depth_info: str | None
+    wrench: str | None = None
+    pose: str | None = None
+    gripper: str | None = None
+    color: str | None = None
+    depth: str | None = None
+    color_info: str | None = None
+    depth_info: str | None = None
 
 
 class Tool(Section):
@@ -67,24 +67,24 @@ DrawZ = Annotated[float, Range(-2, 1)]
 
 
 class SetupParams(Section):
-    fork_width: Annotated[float, Range(0.02, 2)]
-    foot_height: Annotated[float, Range(0, 1)]
-    fork_height: Annotated[float, Range(0.05, 3)]
-    clamp_direction: Direction
-    projectile_mass: Annotated[float, Range(1e-3, 1)]
-    air_density: Annotated[float, Range(0, 100)]
-    grip_force: Annotated[float, Range(0.1, 500)]
-    finger_opening_time: Annotated[float, Range(1e-3, 1)]
-    max_force: Annotated[float, Range(0.1, 1000)]
-    arm_stiffness: Annotated[float, Range(300, 1e6)] | None
-    draw_y: Annotated[tuple[DrawY, DrawY], LIST, ASCENDING]
-    draw_z: Annotated[tuple[DrawZ, DrawZ], LIST, ASCENDING]
-    base_to_fork: Pose | None
-    camera_to_fork: Pose | None
-    urdf: FileName | None
-    tip_link: str | None
-    tool: Tool | None
-    topics: Topics
+    fork_width: Annotated[float, Range(0.02, 2)] = 0.275
+    foot_height: Annotated[float, Range(0, 1)] = 0.02
+    fork_height: Annotated[float, Range(0.05, 3)] = 0.52
+    clamp_direction: Direction = (0.0, 0.0, -1.0)
+    projectile_mass: Annotated[float, Range(1e-3, 1)] = 0.039
+    air_density: Annotated[float, Range(0, 100)] = 1.2
+    grip_force: Annotated[float, Range(0.1, 500)] = 40.0
+    finger_opening_time: Annotated[float, Range(1e-3, 1)] = 0.004
+    max_force: Annotated[float, Range(0.1, 1000)] = 30.0
+    arm_stiffness: Annotated[float, Range(300, 1e6)] | None = 12000.0
+    draw_y: Annotated[tuple[DrawY, DrawY], LIST, ASCENDING] = (-0.45, -0.25)
+    draw_z: Annotated[tuple[DrawZ, DrawZ], LIST, ASCENDING] = (-0.3, -0.1)
+    base_to_fork: Pose | None = None
+    camera_to_fork: Pose | None = None
+    urdf: FileName | None = None
+    tip_link: str | None = None
+    tool: Tool | None = None
+    topics: Topics = Topics()
 
 
 Speed = Annotated[float, Range(0.005, 3)]
@@ -110,9 +110,9 @@ class Gripper(Section):
     themselves, for open and for closed.
     """
 
-    open: Opening
-    closed: Opening
-    position: Annotated[str | tuple[float, float], BeforeValidator(_is_position)]
+    open: Opening = 0.08
+    closed: Opening = 0.0
+    position: Annotated[str | tuple[float, float], BeforeValidator(_is_position)] = "finger"
 
     def command(self, gap: float) -> float:
         """The position that commands a gap [m] between open and closed."""
@@ -140,22 +140,26 @@ class Dip(Section):
 class PlanParams(Section):
     """How a robot records a band: read by `sling plan`, and by the virtual rig for its dips."""
 
-    draw: Annotated[tuple[DrawY, DrawZ], LIST]
-    dips: Annotated[tuple[Dip, ...], LIST]
-    max_speed: Speed
-    pull_speed: Speed
-    max_acceleration: Annotated[float, Range(0.05, 30)]
-    lead_in: Annotated[float, Range(0.5, 60)]
-    finger_time: Annotated[float, Range(0.05, 10)]
-    pause: Annotated[float, Range(0.5, 60)]  # the held force is the mean of the last 0.5 s
-    wait: Annotated[float, Range(0, 60)]
-    approach: Way
-    retreat: Way
-    floor_clearance: Way
-    hanging: Annotated[float, Range(0, 3)] | None
-    gripper: Gripper
-    orientation: Quaternion | None
-    frame: Annotated[str, FILLED]
+    draw: Annotated[tuple[DrawY, DrawZ], LIST] = (-0.4, 0.0)
+    dips: Annotated[tuple[Dip, ...], LIST] = (
+        Dip(at=0.8, depth=0.21, out_time=1.05, back_time=1.05),
+        Dip(at=1.0, depth=0.26, out_time=1.3, back_time=1.3),
+        Dip(at=1.0, depth=0.23, out_time=1.15, back_time=1.15),
+    )
+    max_speed: Speed = 0.4
+    pull_speed: Speed = 0.2
+    max_acceleration: Annotated[float, Range(0.05, 30)] = 2.0
+    lead_in: Annotated[float, Range(0.5, 60)] = 1.0
+    finger_time: Annotated[float, Range(0.05, 10)] = 0.7
+    pause: Annotated[float, Range(0.5, 60)] = 2.0  # the held force is the mean of the last 0.5 s
+    wait: Annotated[float, Range(0, 60)] = 1.5
+    approach: Way = 0.1
+    retreat: Way = 0.06
+    floor_clearance: Way = 0.1
+    hanging: Annotated[float, Range(0, 3)] | None = None
+    gripper: Gripper = Gripper()
+    orientation: Quaternion | None = None
+    frame: Annotated[str, FILLED] = "base"
 
     @model_validator(mode="after")
     def _pulls_slower(self) -> PlanParams:

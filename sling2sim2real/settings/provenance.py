@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 RECORDING = ("force", "cloud", "episode")  # whole sections
 RECORDED_SETUP = ("base_to_fork", "camera_to_fork", "tip_link", "tool", "topics", "urdf")
@@ -36,7 +36,7 @@ class Change:
         return f"{self.key} was {_short(self.old)}, is {_short(self.new)}"
 
 
-def settings_of(params: Params, band: str, method: str) -> dict[str, Any]:
+def settings_of(params: Settings, band: str, method: str) -> dict[str, Any]:
     """The settings that θ of a band and a method rests on, by their keys in params.yaml.
 
     But for those of launches that are evidence: `evidence_settings_of`. Values are those of JSON:
@@ -53,12 +53,12 @@ def settings_of(params: Params, band: str, method: str) -> dict[str, Any]:
     return settings
 
 
-def evidence_settings_of(params: Params) -> dict[str, Any]:
+def evidence_settings_of(params: Settings) -> dict[str, Any]:
     """The settings that launches as evidence rest on, as `settings_of` gives them."""
     return _launch(params) | {"trials.actuation_error": params.trials.actuation_error}
 
 
-def policy_settings_of(params: Params, band: str) -> dict[str, Any]:
+def policy_settings_of(params: Settings, band: str) -> dict[str, Any]:
     """The settings that a policy rests on beside its θ, as `settings_of` gives them."""
     settings = flat(f"bands.{band}", params.bands[band])
     settings |= _launch(params) | flat("launch", params.launch)
@@ -73,7 +73,7 @@ def changes(then: Mapping[str, Any], now: Mapping[str, Any]) -> list[Change]:
     return [change for change in compared if change.old != change.new]
 
 
-def changed_since(params: Params, content: Mapping[str, Any], method: str) -> list[Change]:
+def changed_since(params: Settings, content: Mapping[str, Any], method: str) -> list[Change]:
     """What has changed since the θ of a file's content was identified, as far as it tells."""
     then = content.get("made_with")
     if not then or method not in params.methods:
@@ -84,11 +84,11 @@ def changed_since(params: Params, content: Mapping[str, Any], method: str) -> li
     return changes(then, now)
 
 
-def _launch(params: Params) -> dict[str, Any]:
+def _launch(params: Settings) -> dict[str, Any]:
     return _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
 
 
-def _part(params: Params, section: str, *names: str) -> dict[str, Any]:
+def _part(params: Settings, section: str, *names: str) -> dict[str, Any]:
     values = getattr(params, section)
     return dict(
         leaf for name in names for leaf in _leaves(f"{section}.{name}", getattr(values, name))

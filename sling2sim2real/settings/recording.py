@@ -13,16 +13,16 @@ Delay = Annotated[float, Range(-4e9, 4e9)]  # s: clocks may be of other epochs
 
 
 class DelayParams(Section):
-    pose: Delay | None
-    camera: Delay | None
+    pose: Delay | None = None
+    camera: Delay | None = None
 
 
 class EpisodeParams(Section):
-    samples: Annotated[int, Range(30, 10_000)]
-    duration: Annotated[float, Range(1, 120)]
-    longest: Annotated[float, Range(1, 120)]
-    tail: Annotated[float, Range(0.1, 60)]
-    delays: DelayParams
+    samples: Annotated[int, Range(30, 10_000)] = 300
+    duration: Annotated[float, Range(1, 120)] = 9.0
+    longest: Annotated[float, Range(1, 120)] = 20.0
+    tail: Annotated[float, Range(0.1, 60)] = 0.7
+    delays: DelayParams = DelayParams()
 
     @model_validator(mode="after")
     def _within(self) -> EpisodeParams:
@@ -34,8 +34,8 @@ class EpisodeParams(Section):
 
 
 class ForceParams(Section):
-    cutoff: Annotated[float, Range(1e-4, 1e4)]
-    cutoff_unit: Literal["rad/sample", "rad/s", "Hz"]
+    cutoff: Annotated[float, Range(1e-4, 1e4)] = 0.224
+    cutoff_unit: Literal["rad/sample", "rad/s", "Hz"] = "rad/sample"
 
     @model_validator(mode="after")
     def _below_nyquist(self) -> ForceParams:
@@ -45,10 +45,10 @@ class ForceParams(Section):
 
 
 class CloudParams(Section):
-    points: Annotated[int, Range(10, 100_000)]
-    mask: Literal["opencv", "folder"]
-    statistical_neighbors: Annotated[int, Range(1, 1000)]
-    statistical_ratio: Annotated[float, Range(0.1, 100)]
-    radius: Annotated[float, Range(1e-4, 1)]
-    radius_neighbors: Annotated[int, Range(1, 1000)]
-    sampling: Literal["after_filters", "before_filters"]
+    points: Annotated[int, Range(10, 100_000)] = 1000
+    mask: Literal["opencv", "folder"] = "opencv"
+    statistical_neighbors: Annotated[int, Range(1, 1000)] = 20
+    statistical_ratio: Annotated[float, Range(0.1, 100)] = 2.0
+    radius: Annotated[float, Range(1e-4, 1)] = 0.01
+    radius_neighbors: Annotated[int, Range(1, 1000)] = 5
+    sampling: Literal["after_filters", "before_filters"] = "after_filters"

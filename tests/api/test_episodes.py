@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from pipeline.params import load
 from sling2sim2real import Band, Episode, Settings, episode_from_arrays, read_mcap
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording.build import build_episodes
-from sling2sim2real.settings import load
 from tests.api.toy import still
 from tests.project import DEFAULTS
 from tests.recording.conftest import written

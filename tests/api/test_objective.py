@@ -1,5 +1,7 @@
 """The objective is a method's loss, or one's own; fixed parameters are no axes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,17 +10,23 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.objective.loss import EpisodeLoss
+from sling2sim2real.settings.identification import MethodParams
 from sling2sim2real.simulator.model import ClampedBand
 
 
 def test_it_is_the_loss_of_the_method(world, episode) -> None:
-    objective = Objective(world, [episode, episode], method="real2sim2real")
+    method = MethodParams(
+        search="de",
+        fixed={"poissons_ratio": 0.45, "elasticity_damping": 5e-3, "damping_scale": 1.0},
+    )
+    settings = world.settings.changed(methods={"by_two": method.model_dump()})
+    world = replace(world, settings=settings)
+    objective = Objective(world, [episode, episode], method="by_two")
     assert objective.names == ("youngs_modulus", "dynamic_friction")
     unit = np.array([[0.3, 0.5], [0.6, 0.9], [0.4, 0.7]])
-    settings = world.settings
     sling = ClampedBand.of(world.band, settings.setup, settings.sling)
-    loss = EpisodeLoss.of(settings, "real2sim2real", episode, sling)
-    space = SearchBox.of_method(settings, "real2sim2real")
+    loss = EpisodeLoss.of(settings, "by_two", episode, sling)
+    space = SearchBox.of_method(settings, "by_two")
     whole = [space.unit_of(objective.theta(point).parameters)[0] for point in unit]
     theirs = Evaluator(episode, sling, loss, space)(np.array(whole)).total
     assert np.allclose(objective(unit), 2 * theirs)

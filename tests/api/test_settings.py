@@ -4,15 +4,7 @@ import pytest
 
 from sling2sim2real import Settings
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS
-
-
-def test_defaults_are_the_projects_own(nowhere) -> None:
-    """No file lies in the working folder."""
-    ours, theirs = Settings.default().model_dump(), load(DEFAULTS).model_dump()
-    differ = {name for name in theirs if ours[name] != theirs[name]}
-    assert differ == {"bands", "run"}
 
 
 def test_a_fork_of_any_width_will_do() -> None:
@@ -22,10 +14,11 @@ def test_a_fork_of_any_width_will_do() -> None:
 
 def test_changes_reach_any_depth_and_nothing_else() -> None:
     old = Settings.default()
-    new = old.changed(rig={"camera": {"focal": 500.0}}, setup={"draw_y": [-0.4, -0.2]})
-    assert (new.rig.camera.focal, new.setup.draw_y) == (500.0, (-0.4, -0.2))
+    new = old.changed(policy={"reward": {"height": 4.0}}, setup={"draw_y": [-0.4, -0.2]})
+    assert (new.policy.reward.height, new.setup.draw_y) == (4.0, (-0.4, -0.2))
     back = new.changed(
-        rig={"camera": {"focal": old.rig.camera.focal}}, setup={"draw_y": old.setup.draw_y}
+        policy={"reward": {"height": old.policy.reward.height}},
+        setup={"draw_y": old.setup.draw_y},
     )
     assert back == old
 

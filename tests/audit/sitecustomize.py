@@ -90,7 +90,7 @@ def shorten(step: str) -> None:
 def install(stage: str) -> None:
     os.environ["AUDITED"] = stage
     sys.path.insert(0, os.getcwd())
-    from sling2sim2real import settings as params
+    from pipeline import params
 
     load = params.load
     params.load = lambda *path: Section(load(*path))

@@ -35,7 +35,7 @@ import hashlib, sys
 import numpy as np
 from sling2sim2real.base.native import wp
 from sling2sim2real.identification.objective.loss import EpisodeLoss
-from sling2sim2real.settings import load
+from pipeline.params import load
 from sling2sim2real.simulator.interaction import interact
 from sling2sim2real.simulator.launch import launch
 from sling2sim2real.simulator.model import LaunchSetup

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pipeline.params import Params, load
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.card.inputs import CardInputs, card_inputs
 from sling2sim2real.recording.build import build_episodes
-from sling2sim2real.settings import Params, load
 from sling2sim2real.simulator.parameters import EXTRA
 from tests import once
 from tests.policy.stored import write_stored

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.card.text import GLOSSARY
 from sling2sim2real.card.write import write
-from sling2sim2real.settings import load
 from tests.card.conftest import BAND, METHOD
 
 FILES = {

@@ -2,7 +2,6 @@
 
 import os
 import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,7 +10,7 @@ from dvc.config import Config
 
 from sling2sim2real.base.disk import expect_ready
 from sling2sim2real.base.errors import UserError
-from tests.project import DEFAULTS, ROOT, python
+from tests.project import DEFAULTS, python
 from validation.projects import SLING, environment
 
 # Root writes what is marked read-only, but for this.
@@ -36,7 +35,6 @@ def project(tmp_path: Path) -> Path:
         "fit mine.mcap --mass 0.023",
         "observe --band band1 --draw=-0.30,-0.15 --landing 1.85",
         "setup --max-force 40",
-        "ui --port 43217",
     ],
 )
 def test_a_project_that_may_not_be_written_is_refused_in_one_line(
@@ -72,28 +70,5 @@ def test_a_full_disk_is_told_before_anything_changes(project: Path, monkeypatch)
 
 
 def test_the_help_of_a_stream_that_has_no_theta() -> None:
-    done = python("-m", "app", "launch", "--help", PYTHONIOENCODING="ascii:strict")
+    done = python("-m", "sling2sim2real", "launch", "--help", PYTHONIOENCODING="ascii:strict")
     assert (done.returncode, done.stderr) == (0, "") and "\\u03b8 file" in done.stdout
-
-
-def test_an_app_of_the_users_own_is_in_nobodys_way(tmp_path: Path) -> None:
-    """ROS puts the working folder on PYTHONPATH, where a user may have an sling2sim2real.cli.py."""
-    for name in ("app", "pipeline", "stages"):
-        (tmp_path / f"{name}.py").write_text("raise SystemExit('not this one')\n")
-    code = f"import sys; sys.path.append({str(ROOT)!r})\nfrom sling_command import main; main()"
-    variables = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    command = [sys.executable, "-c", code, "--version"]
-    done = subprocess.run(command, cwd=tmp_path, env=variables, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "") and done.stdout.startswith("sling2sim2real")
-
-
-def test_a_pipeline_of_the_users_own_is_passed_over_or_named(tmp_path: Path) -> None:
-    module = tmp_path / "pipeline.py"
-    module.write_text("")
-    code = f"import sys; sys.path.append({str(ROOT)!r})\nimport {{}}sling2sim2real as s2s"
-    for first, ends in (("", ""), ("pipeline, ", "or import sling2sim2real first")):
-        command = [sys.executable, "-c", code.format(first)]
-        variables = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
-        done = subprocess.run(command, cwd=tmp_path, env=variables, capture_output=True, text=True)
-        assert (done.returncode, done.stderr.strip()[-len(ends) or None :]) == (bool(first), ends)
-    assert str(module) in done.stderr

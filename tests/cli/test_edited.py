@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.params import load
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli.launch import launch_output
 from sling2sim2real.cli.observe import prediction_of
 from sling2sim2real.exporting.export import replaceable
-from sling2sim2real.settings import load
 from tests.card.conftest import POINT, samples, theta_file
 from tests.edited import edits, outcomes
 from tests.project import DEFAULTS

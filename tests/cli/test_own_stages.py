@@ -4,7 +4,7 @@ import networkx
 import pytest
 
 from pipeline.flow.dvc import graph_of
-from sling2sim2real.settings import load
+from pipeline.params import load
 from stages.start import stage_of
 from tests.project import BAND
 from validation.projects import ProjectCopy, copy_project, run_of

@@ -7,12 +7,12 @@ from dvc.utils.hydra import apply_overrides
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.params import Params, load
 from sling2sim2real.cli.fit.fit import NewBand, corrected
 from sling2sim2real.cli.params_file import edited
 from sling2sim2real.cli.preflight.add_band import _with_band
 from sling2sim2real.cli.remove_band import remove_band
 from sling2sim2real.cli.setup import LabMeasures, set_up
-from sling2sim2real.settings import load, parse
 from tests.project import BAND, DEFAULTS
 from tools.preset import preset, write_preset
 
@@ -110,7 +110,7 @@ def test_whatever_is_changed_dvc_moves_no_line(
             content["run"]["own"].remove(name)
 
     text = edited(TEXT, change)
-    assert parse(text).run.own == tuple(names[:retained])
+    assert Params.parse(text).run.own == tuple(names[:retained])
     assert text == by_dvc(text, folder)
 
 

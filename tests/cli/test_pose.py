@@ -11,13 +11,13 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
+from pipeline.params import load
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli.plan.plan import plan_recording
 from sling2sim2real.cli.pose import posed
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.recording.frames import EpisodeGeometry, geometry_of
 from sling2sim2real.recording.streams import read_recording
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS, with_
 from validation.recordings.bag import write_bag
 

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.params import load
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli import safety
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.settings import load
 from sling2sim2real.settings.provenance import evidence_settings_of, policy_settings_of, settings_of
 from sling2sim2real.simulator.parameters import THETA
 from tests.project import DEFAULTS, with_

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.setup import LabMeasures, confirmed, fork_of, requested, set_up, shown
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS
 
 LEFT, RIGHT = (0.70, 0.1375, 0.42), (0.70, -0.1375, 0.42)  # the target along the base's x

@@ -3,9 +3,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.params import load
 from pipeline.report import paper
 from sling2sim2real.drawing.styles import FEW, KNOWN, drawn, styles
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS
 
 METHODS = st.lists(st.sampled_from([*KNOWN, "mine", "yours", "theirs"]), unique=True, min_size=1)

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.params import load
 from sling2sim2real.episode.planned import leg_time, legs_of, planned_pull
-from sling2sim2real.settings import load
 from sling2sim2real.settings.lab import Dip
 from tests.project import DEFAULTS
 

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
+from pipeline.params import load
 from sling2sim2real.cli.plan.plan import Plan, plan_recording
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS, ROOT, with_
 
 FOLDER = ROOT / "examples" / "franka"

@@ -10,11 +10,11 @@ import onnxruntime
 import pytest
 import torch
 
+from pipeline.params import load
 from sling2sim2real.base.files import write_json
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.policy.check import PolicyCheck, figures
 from sling2sim2real.policy.export import USED, card, write_onnx
-from sling2sim2real.settings import load
 from sling2sim2real.simulator.parameters import THETA
 from tests.golden import expect_golden
 from tests.policy import toy

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from pipeline.params import Params, load
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.recording.build import Processed, Whole, episode_of, process_recording
 from sling2sim2real.recording.events import Part, Pull
 from sling2sim2real.recording.frames import geometry_of
 from sling2sim2real.recording.mask import RidgeMask
 from sling2sim2real.recording.streams import Recording, read_recording
-from sling2sim2real.settings import Params, load
 from tests import once
 from tests.project import DEFAULTS, with_
 from validation.recordings.bag import Truth, write_bag

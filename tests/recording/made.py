@@ -3,12 +3,12 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
+from pipeline.params import Params
 from sling2sim2real.recording import checks
 from sling2sim2real.recording.build import Whole
 from sling2sim2real.recording.checks import Finding
 from sling2sim2real.recording.events import Part, Pull
 from sling2sim2real.recording.signals import signals_of
-from sling2sim2real.settings import Params
 
 BAND = "band1"
 

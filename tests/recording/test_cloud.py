@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording import clouds as cloud
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS
 from validation.recordings import looks
 from validation.recordings.looks import BAND, LOOKS

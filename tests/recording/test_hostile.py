@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from mcap.writer import Writer
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.recording.streams import read_recording
 from sling2sim2real.recording.words import shortened
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS
 from validation.recordings.bag import blind_bag
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording.clouds import clouds_of
 from sling2sim2real.recording.mask import Colors, RidgeMask, Shape
 from sling2sim2real.recording.scene import View
 from sling2sim2real.recording.transforms import Transform
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS
 from validation.recordings import looks, strand
 from validation.recordings.looks import LOOKS

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.params import load
 from sling2sim2real.recording.build import Processed, episode_of, process_recording
-from sling2sim2real.settings import BandParams, load
+from sling2sim2real.settings import BandParams
 from tests.project import DEFAULTS, ROOT
 
 FOLDER = ROOT.parent / "shared/recordings"

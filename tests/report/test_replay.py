@@ -7,10 +7,10 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from pipeline.layout import Layout
+from pipeline.params import load
 from pipeline.report.replay import replay_method
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.loss import EpisodeLoss
-from sling2sim2real.settings import load
 from sling2sim2real.simulator.interaction import interact
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import THETA as NAMES

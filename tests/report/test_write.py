@@ -28,7 +28,7 @@ def written(root, params) -> str:
 
 ELSEWHERE = """\
 from pathlib import Path
-from sling2sim2real.settings import load
+from pipeline.params import load
 from pipeline.report import report, write
 from tests.report.toy_replay import toy_landscape, toy_replay
 from tests.report.toy_run import run_of

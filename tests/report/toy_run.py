@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 
 from pipeline.layout import Layout
+from pipeline.params import Params, load
+from pipeline.params.run import RunParams
 from sling2sim2real.identification.searches.regions import Region, save_regions
 from sling2sim2real.launching.launches_file import COLUMNS, MORE
-from sling2sim2real.settings import Params, load
 from sling2sim2real.settings.identification import LAWS
-from sling2sim2real.settings.run import RunParams
 from sling2sim2real.simulator.parameters import THETA as NAMES
 from tests.project import with_
 from tests.report.conftest import BAND, METHOD, PAIR, THETA, confidence

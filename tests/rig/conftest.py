@@ -2,9 +2,9 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.params import Params
 from rig.recorder.interaction import Interaction
 from rig.recorder.record import record
-from sling2sim2real.settings import Params
 from tests import once
 from tests.project import ROOT, with_
 

@@ -7,9 +7,9 @@ from dataclasses import asdict
 import pytest
 from pydantic import ValidationError
 
+from pipeline.params import Params
 from rig.physics.draw import sampled
 from sling2sim2real.identification.posterior.likelihood import Tolerances
-from sling2sim2real.settings import Params
 from sling2sim2real.settings.identification import POSTERIOR
 from tests.project import with_
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from pipeline.params import Params
 from rig.physics.launch import launch as on_the_rig
 from sling2sim2real.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK
-from sling2sim2real.settings import Params
 from sling2sim2real.simulator import ClampedBand, LaunchSetup, launch
 from sling2sim2real.simulator.parameters import Parameters
 from tests.project import with_

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 
+from pipeline.params import Params, Section
+from pipeline.params.virtual_rig import RigFlow, RigSoftening, RigSpectrum
 from rig.physics import motion
 from rig.physics.launch import launch
 from rig.recorder import camera, record
-from sling2sim2real.settings import Params, Section
 from sling2sim2real.settings.lab import Dip
-from sling2sim2real.settings.virtual_rig import RigFlow, RigSoftening, RigSpectrum
 from tests.project import with_
 
 TF, GRIPPER = "/tf_static", "/franka_gripper/joint_states"

@@ -6,11 +6,11 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+from pipeline.params import load
 from sling2sim2real.base.machine import gpus
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.objective.loss import EpisodeLoss
-from sling2sim2real.settings import load
 from sling2sim2real.simulator import interact, launch
 from sling2sim2real.simulator.model import LaunchHistory
 from sling2sim2real.simulator.parameters import Parameters

@@ -9,9 +9,9 @@ import pytest
 from ruamel.yaml import YAML
 
 from pipeline.layout import Layout
+from pipeline.params import load
 from sling2sim2real.base.files import write_json
 from sling2sim2real.identification.results.theta import calibrated, load_theta
-from sling2sim2real.settings import load
 from sling2sim2real.simulator.parameters import Parameters
 from tests.project import DEFAULTS
 from validation.synthetic import own_law_episode, recorded_yardstick

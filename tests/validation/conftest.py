@@ -1,6 +1,6 @@
 import pytest
 
-from sling2sim2real.settings import Params
+from pipeline.params import Params
 from sling2sim2real.simulator.model import ClampedBand
 from validation.simulator.finding import Bench
 

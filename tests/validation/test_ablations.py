@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from pipeline.params import load
 from sling2sim2real.identification.objective.box import latin_hypercube
 from sling2sim2real.identification.searches.de import differential_evolution
-from sling2sim2real.settings import load
 from tests.identification.searches.functions import batches_of
 from validation.campaigns.ablations import FIRST, PAPER, Job, jobs_of, summary
 from validation.campaigns.variants import LAST, rollouts_of_search, with_preset, with_variants

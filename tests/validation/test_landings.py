@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.params import load
 from rig.oracle.world import ExactLaunches
 from rig.physics.launch import Trial
-from sling2sim2real.settings import load
 from validation.campaigns import rig_scores
 from validation.campaigns.landings import (
     FIRST,

@@ -12,11 +12,11 @@ from functools import partial
 import numpy as np
 from scipy.stats import qmc
 
+from pipeline.params import Params
 from sling2sim2real.base.machine import named
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.objective.loss import EpisodeLoss
-from sling2sim2real.settings import Params
 from sling2sim2real.simulator.interaction import Rollouts, interact, schedule_of
 from sling2sim2real.simulator.launch import Launches, launch
 from sling2sim2real.simulator.model import LaunchSetup
@@ -120,7 +120,7 @@ def steps_of(schedule) -> dict[str, int]:
 def first_start(device: str) -> dict[str, float]:
     """Seconds that a new process needs for one launch: with an empty kernel cache, and again."""
     code = (
-        "from sling2sim2real.settings import load; p = load();"
+        "from pipeline.params import load; p = load();"
         "from sling2sim2real.simulator import ClampedBand, LaunchSetup, Parameters, launch;"
         "b = next(iter(p.bands.values())); lab = p.setup, p.sling;"
         "launch(ClampedBand.of(b, *lab), LaunchSetup.of(*lab),"

@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import spearmanr
 
+from pipeline.params import Params, load
 from rig.physics.launch import launch
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
@@ -30,7 +31,7 @@ from sling2sim2real.base.machine import processor
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.posterior.likelihood import opening_time
-from sling2sim2real.settings import Params, expect_known, load
+from sling2sim2real.settings import expect_known
 from sling2sim2real.settings.identification import MethodParams
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import aimed, recorded, sling_of

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import pytest
 
+from pipeline.params import Params, load
 from sling2sim2real.base.code import ROOT
 from sling2sim2real.base.files import write_json
-from sling2sim2real.settings import Params, load
 from validation.environment import environment
 from validation.projects import DEFAULTS
 from validation.reports import plain

@@ -19,9 +19,9 @@ from functools import partial
 from pathlib import Path
 
 import sling2sim2real as s2s
+from pipeline.params import Params, load
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.settings import Params, load
 from validation import orange
 from validation.campaigns import runner
 from validation.projects import with_section

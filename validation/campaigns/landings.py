@@ -25,12 +25,12 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.params import Params, load
 from rig.oracle.world import World
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.fingerprint import fingerprint
 from sling2sim2real.identification.posterior.launches import Observed
-from sling2sim2real.settings import Params, load
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import (
     TARGETS,

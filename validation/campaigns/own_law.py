@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pipeline.params import Params, load
 from sling2sim2real.base import errors
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.planned import planned_pull
@@ -27,7 +28,6 @@ from sling2sim2real.episode.signal import cutoff_hz
 from sling2sim2real.identification.posterior.coordinates import Coordinates
 from sling2sim2real.identification.posterior.likelihood import Failed, Likelihood, Tolerances
 from sling2sim2real.identification.posterior.residuals import BINS, nearest
-from sling2sim2real.settings import Params, load
 from sling2sim2real.settings.lab import Dip
 from sling2sim2real.simulator.interaction import Rollouts, interact
 from sling2sim2real.simulator.model import ClampedBand

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from ruamel.yaml import YAML
 
+from pipeline.params import Params
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.world import World
 from sling2sim2real.base.files import replacing, write_json
@@ -20,7 +21,6 @@ from sling2sim2real.identification.clamps import calibrate_clamps
 from sling2sim2real.identification.results.mounting import Mounting
 from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.launching.trials.spread import landing_intervals
-from sling2sim2real.settings import Params
 from sling2sim2real.simulator.model import ClampedBand
 from validation.density import Calibrated
 

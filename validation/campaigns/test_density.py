@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.params import Params
 from sling2sim2real.base.code import ROOT
 from sling2sim2real.launching.trials.spread import landing_intervals
-from sling2sim2real.settings import Params
 from validation import density
 from validation.campaigns.rig_scores import built, sling_of
 from validation.campaigns.runner import OURS

@@ -11,6 +11,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
+from pipeline.params import Params, load
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.world import World
@@ -19,7 +20,6 @@ from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.results.theta import load_theta, parameters_of
 from sling2sim2real.launching.surface.simulator import simulator
 from sling2sim2real.launching.surface.stored import Stored
-from sling2sim2real.settings import Params, load
 from sling2sim2real.settings.identification import STEPS
 from sling2sim2real.simulator.parameters import EXTRA
 from validation.campaigns.runner import OURS, PAPER

@@ -2,8 +2,8 @@
 
 import pytest
 
+from pipeline.params import Params
 from sling2sim2real.recording.clouds import clouds_of
-from sling2sim2real.settings import Params
 from validation.recordings import looks
 from validation.recordings.scores import figures
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from pipeline.params import load
 from pipeline.report.tables.landings import prediction_error
 from sling2sim2real.base.code import ROOT
-from sling2sim2real.settings import load
 from validation.campaigns.runner import OURS
 from validation.projects import ProjectCopy, copy_project
 

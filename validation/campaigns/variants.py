@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from ruamel.yaml import YAML
 
+from pipeline.params import Params
 from sling2sim2real.base.code import ROOT
 from sling2sim2real.identification.search import rollouts_of
-from sling2sim2real.settings import Params
 from sling2sim2real.simulator.rubber import COROTATED
 from validation.campaigns.runner import PAPER
 

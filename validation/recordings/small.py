@@ -18,7 +18,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType
 from mcap_ros2.decoder import DecoderFactory
 
-from sling2sim2real.settings import Params, load
+from pipeline.params import Params, load
 from validation.projects import DEFAULTS
 from validation.recordings.bag import (
     Lens,

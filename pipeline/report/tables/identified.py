@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
+from pipeline.params import Params
 from pipeline.report.results import Results
 from pipeline.report.tables.cells import NONE, Table, number, percent
 from pipeline.report.tables.parameters import exactly, printed_loss
 from sling2sim2real.drawing.names import as_code, cell
 from sling2sim2real.drawing.styles import Styles
 from sling2sim2real.quantities import QUANTITIES, Quantity, coordinate
-from sling2sim2real.settings import Params
 from sling2sim2real.settings.identification import POSTERIOR
 
 SEARCHES = {

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from pipeline.params import Params
 from pipeline.report import paper
 from pipeline.report.results import PRINTED, Result, Results
 from pipeline.report.tables.benchmark import PAPER, band_name, method_name, ordered
@@ -16,7 +17,6 @@ from sling2sim2real.drawing.styles import Styles
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.results.units import SI_UNITS
 from sling2sim2real.quantities import QUANTITIES
-from sling2sim2real.settings import Params
 from sling2sim2real.settings.identification import LAWS
 from sling2sim2real.simulator.parameters import THETA
 from sling2sim2real.simulator.rubber import RUBBER

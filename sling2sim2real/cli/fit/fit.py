@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.flow.dvc import repro
+from pipeline.params import Params, load
 from sling2sim2real.base.disk import expect_ready
 from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.base.files import write_text
@@ -23,7 +24,6 @@ from sling2sim2real.cli.preflight.recordings import add_recording, digests, rene
 from sling2sim2real.identification.posterior.evidence import read_evidence
 from sling2sim2real.recording.files import name_of as name_of_file
 from sling2sim2real.recording.files import once
-from sling2sim2real.settings import Params, load, parse
 from stages.start import stage_of
 
 
@@ -154,7 +154,7 @@ def corrected(path: Path, name: str, band: NewBand) -> Iterator[Params]:
         )
     before = path.read_text("utf-8")
     text = edited(before, lambda content: content["bands"][name].update(new))
-    params = parse(text, str(path))
+    params = Params.parse(text, str(path))
     write_text(path, text)
     try:
         for what, value in new.items():

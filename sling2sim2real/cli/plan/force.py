@@ -10,10 +10,10 @@ from typing import cast
 import numpy as np
 from scipy.optimize import brentq
 
+from pipeline.params import Params
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.safety import of_mounting, tell
 from sling2sim2real.recording.transforms import Transform
-from sling2sim2real.settings import Params
 from sling2sim2real.settings.lab import BandParams, SetupParams
 
 ALIKE = 0.02  # relative: stretches that are as good as equal

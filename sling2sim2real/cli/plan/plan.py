@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pipeline.params import Params
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import replacing, write_json, write_text
 from sling2sim2real.base.layout import Layout
@@ -25,7 +26,7 @@ from sling2sim2real.cli.pose import fork_in_base
 from sling2sim2real.cli.sizes import band_to_come
 from sling2sim2real.recording.frames import FORK
 from sling2sim2real.recording.transforms import Transform
-from sling2sim2real.settings import Params, expect_known
+from sling2sim2real.settings import expect_known
 from sling2sim2real.settings.lab import Gripper
 
 INFORMATIVE, PAPER = PULLS

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ruamel.yaml.comments import CommentedMap
 
+from pipeline.params import Params, load
 from sling2sim2real.base.disk import expect_writable
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_text
@@ -16,7 +17,6 @@ from sling2sim2real.cli.params_file import edited
 from sling2sim2real.cli.preflight import recordings as files
 from sling2sim2real.cli.sizes import DIAMETER, REST_LENGTH, assumed
 from sling2sim2real.recording.files import once
-from sling2sim2real.settings import load, parse
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -63,7 +63,7 @@ def add_band(
             f" or correct it (`sling fit --name {name} --mass ...`)"
         )
     text = _with_band(path, name, band)
-    after = parse(text, str(path))
+    after = Params.parse(text, str(path))
     new = files.targets(recordings, layout.raw(name))
     there = files.digests(layout.recordings(name))
     same = there and there.keys() == files.digests(recordings).keys()

@@ -25,7 +25,7 @@ from sling2sim2real.recording.events import parts_of
 from sling2sim2real.recording.files import Container, read_container, sha256
 from sling2sim2real.recording.frames import geometry_of
 from sling2sim2real.recording.streams import Recording, recording_of
-from sling2sim2real.settings import Params, expect_known
+from sling2sim2real.settings import Settings, expect_known
 from sling2sim2real.settings.lab import BandParams
 
 
@@ -62,7 +62,7 @@ class GivenBand:
 
 def look_at(
     path: Path,
-    params: Params,
+    params: Settings,
     band: GivenBand,
     pull: int | None = None,
 ) -> Look:
@@ -107,7 +107,7 @@ def look_at(
 
 
 def band_of(
-    params: Params,
+    params: Settings,
     name: str | None = None,
     mass: float | None = None,
     diameter: float | None = None,

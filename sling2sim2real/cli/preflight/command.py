@@ -7,12 +7,12 @@ from pathlib import Path
 from sling2sim2real.cli.preflight.check import band_of, look_at
 from sling2sim2real.cli.preflight.output import expect_writable, written
 from sling2sim2real.cli.preflight.pictures import expect_new, write_pictures
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 
 def check(
     recording: Path,
-    params: Params,
+    params: Settings,
     *,
     band: str | None = None,
     mass: float | None = None,

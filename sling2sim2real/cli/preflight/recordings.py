@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
+from pipeline.params import load
 from sling2sim2real.base.disk import expect_writable
 from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.base.files import replacing, replacing_folder
@@ -16,7 +17,7 @@ from sling2sim2real.cli.preflight.report import CheckReport
 from sling2sim2real.recording import files as bag
 from sling2sim2real.recording.files import sha256
 from sling2sim2real.recording.mask_folder import MASK_NAME, masks_beside
-from sling2sim2real.settings import Params, expect_known, load
+from sling2sim2real.settings import Settings, expect_known
 
 
 def add_recording(band: str, recordings: Sequence[Path], root: Path | str = ".") -> str:
@@ -69,7 +70,7 @@ def digests(recordings: Sequence[Path]) -> dict[str, Path]:
 
 
 def checked(
-    recordings: Sequence[Path], params: Params, band: str, layout: Layout
+    recordings: Sequence[Path], params: Settings, band: str, layout: Layout
 ) -> list[CheckReport]:
     """What `sling check` says of each. Raises UserError where one cannot be used."""
     reports = []

@@ -20,7 +20,7 @@ from sling2sim2real.recording.build import Whole
 from sling2sim2real.recording.clouds import PictureLine, masker
 from sling2sim2real.recording.scene import RgbdFrame, Scene
 from sling2sim2real.recording.streams import Recording
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.recording import CloudParams
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Moment:
     points: np.ndarray
 
 
-def draw_sheet(look: Look, params: Params, path: Path) -> str:
+def draw_sheet(look: Look, params: Settings, path: Path) -> str:
     """Write a PNG, 1600 pixels wide, of what can be shown.
 
     Returns:
@@ -94,7 +94,7 @@ def moments(scene: Scene) -> dict[str, float]:
     return dict(zip(MOMENTS, when, strict=True))
 
 
-def _seen(done: Whole, params: Params) -> list[Moment]:
+def _seen(done: Whole, params: Settings) -> list[Moment]:
     when = moments(done.scene)
     times = done.clouds.time  # of the pictures that could be decoded
     which = [int(np.argmin(np.abs(times - time))) for time in when.values()]
@@ -107,7 +107,7 @@ def _seen(done: Whole, params: Params) -> list[Moment]:
 
 
 def _whole(
-    figure: Figure, done: Whole, facts: SignalSummary, rows: list[PictureLine], params: Params
+    figure: Figure, done: Whole, facts: SignalSummary, rows: list[PictureLine], params: Settings
 ) -> None:
     from sling2sim2real.drawing.canvas import key, mark  # imports Matplotlib
 

@@ -24,7 +24,7 @@ from sling2sim2real.recording.camera import Camera
 from sling2sim2real.recording.signals import Signals
 from sling2sim2real.recording.streams import Recording, Stream
 from sling2sim2real.recording.transforms import Transform
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 if TYPE_CHECKING:
     import rerun
@@ -36,7 +36,7 @@ JPEG_QUALITY = 85  # of pictures that come raw
 BAND = (255, 0, 255, 150)  # RGBA of the mask
 
 
-def write_timeline(look: Look, params: Params, path: Path) -> str:
+def write_timeline(look: Look, params: Settings, path: Path) -> str:
     """Write an .rrd of what can be shown.
 
     Returns:
@@ -186,7 +186,7 @@ def _motion(log: _Log, signals: Signals, facts: SignalSummary) -> None:
         log.at(time, "events", rerun.TextLog(name, level="INFO"))
 
 
-def _clouds(log: _Log, done: Whole, start: float, params: Params) -> None:
+def _clouds(log: _Log, done: Whole, start: float, params: Settings) -> None:
     import rerun
 
     depth, color = done.pull.recording.depth_camera, done.pull.recording.color_camera

@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,7 @@ class Engine:
     def __init__(self) -> None:
         release()
         self._said = tempfile.TemporaryFile("w+")
-        self._process = subprocess.Popen(
+        self._process: Any = subprocess.Popen(  # whose streams are there
             [_python(), str(Path(worker.__file__))],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said, text=True,
         )  # fmt: skip
@@ -78,7 +79,7 @@ class Engine:
             self._work(folder, steer)
             return dict(np.load(folder / "result.npz"))
 
-    def _work(self, folder: Path, steer) -> None:
+    def _work(self, folder: Path, steer: Any) -> None:
         self._say(folder)
         for line in self._process.stdout:  # PhysX has words of its own there
             if line.strip() == worker.DONE:

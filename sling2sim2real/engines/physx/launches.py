@@ -9,6 +9,7 @@ the projectile then flies as ours does. The arm does not give way, and PhysX's b
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +64,7 @@ class Flight:
     @np.errstate(all="ignore")  # burst bands
     def __call__(self, nodes: np.ndarray) -> np.ndarray | None:
         """One step. Bands that burst, and those whose projectile has left, are led no further."""
-        sound = (np.abs(nodes) < SPACE).all(axis=(1, 2, 3))  # not a number: neither
+        sound: Any = (np.abs(nodes) < SPACE).all(axis=(1, 2, 3))  # not a number: neither
         self.burst |= ~sound & self._going
         self.lanes["outcome"][~sound & self._going] = Outcome.NOT_CONVERGED
         nodes = np.where(sound[:, None, None, None], nodes, self.tube.rest)

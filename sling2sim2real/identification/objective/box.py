@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import LAWS, ParameterBoxes, parameter_names
 from sling2sim2real.simulator.parameters import Parameters
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN
@@ -54,7 +54,7 @@ class SearchBox:
         return cls(names, low, high, log, law, dict(fixed or {}))
 
     @classmethod
-    def of_method(cls, params: Params, method: str) -> SearchBox:
+    def of_method(cls, params: Settings, method: str) -> SearchBox:
         """The box that a method of params.yaml searches, within its bounds."""
         settings = params.methods[method]
         return cls.of(params.parameters, settings.bounds, settings.law, settings.fixed)

@@ -21,7 +21,7 @@ from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.signal import cutoff_hz, recording_matrix
 from sling2sim2real.identification.objective.chamfer import Chamfer, CloudDistance
 from sling2sim2real.identification.objective.device_terms import DeviceTerms
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.interaction import Rollouts
 from sling2sim2real.simulator.model import ClampedBand
 
@@ -84,18 +84,18 @@ class EpisodeLoss:
         )
 
     @classmethod
-    def of(cls, params: Params, method: str, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
+    def of(cls, params: Settings, method: str, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
         """Make it from params.yaml's `loss`, `force` and `methods.<method>`."""
         return cls._weighed(params, dict(params.methods[method].weights), episode, sling)
 
     @classmethod
-    def plain(cls, params: Params, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
+    def plain(cls, params: Settings, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
         """Geometry and force alone, for a part of an episode."""
         return cls._weighed(params, {"geom": 1.0, "force": 1.0, "work": 0.0}, episode, sling)
 
     @classmethod
     def _weighed(
-        cls, params: Params, weights: dict[str, float], episode: Episode, sling: ClampedBand
+        cls, params: Settings, weights: dict[str, float], episode: Episode, sling: ClampedBand
     ) -> EpisodeLoss:
         return cls(
             episode,

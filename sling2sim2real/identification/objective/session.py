@@ -15,7 +15,7 @@ from sling2sim2real.identification.objective.engine import simulate_of
 from sling2sim2real.identification.objective.evaluate import Evaluation, Evaluator
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.identification.results.mounting import sling_of_method
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import OUR_ENGINE
 
 
@@ -42,7 +42,7 @@ class LoggingEvaluator:
 
 def logging_evaluator(
     title: str,
-    params: Params,
+    params: Settings,
     band: str,
     method: str,
     episode: Episode,
@@ -55,7 +55,7 @@ def logging_evaluator(
 
 
 def evaluator(
-    params: Params, band: str, method: str, episode: Episode, clamps: Path | None
+    params: Settings, band: str, method: str, episode: Episode, clamps: Path | None
 ) -> Evaluator:
     """The evaluator of a recorded band, on the devices that the environment names.
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import truncnorm
 
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import LAWS
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import THETA, Parameters
@@ -88,7 +88,7 @@ class Coordinates:
     precision: np.ndarray
 
     @classmethod
-    def of_method(cls, params: Params, method: str, sling: ClampedBand) -> Coordinates:
+    def of_method(cls, params: Settings, method: str, sling: ClampedBand) -> Coordinates:
         """Make the coordinates of a method and its band's sling.
 
         The method is of params.yaml and searches by least squares.

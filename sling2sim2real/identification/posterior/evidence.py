@@ -17,7 +17,7 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_json
 from sling2sim2real.base.schema import LIST, JsonRecord, read_json
 from sling2sim2real.identification.posterior.launches import Evidence, Observed
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.provenance import evidence_settings_of
 from sling2sim2real.simulator.model import LaunchSetup
 
@@ -25,7 +25,7 @@ COLUMNS = (*table.DRAW, "draw_error_m", table.LANDING)  # as they are written
 MOST_ERROR = 0.1  # of a draw [m]
 
 
-def read_evidence(folder: Path, band: str, params: Params) -> list[Observed]:
+def read_evidence(folder: Path, band: str, params: Settings) -> list[Observed]:
     """Read the launches of a band, oldest first; none where it has no file.
 
     A draw without an error of its own has that of a commanded one, `trials.actuation_error`.
@@ -81,7 +81,7 @@ class ObservedFile(JsonRecord):
     made_with: dict[str, float | None] = {}
 
 
-def save_observed(path: Path, launches: Sequence[Observed], params: Params) -> None:
+def save_observed(path: Path, launches: Sequence[Observed], params: Settings) -> None:
     """Write an `ObservedFile`; without launches it is the same whatever the lab is."""
     content: dict = {"launches": [vars(launch) for launch in launches]}
     if launches:

@@ -29,7 +29,7 @@ from sling2sim2real.identification.posterior.residuals import BINS, LEAST_POINTS
 from sling2sim2real.identification.posterior.sampling import SAMPLES, Remaining, samples_of
 from sling2sim2real.identification.results.theta import content_of
 from sling2sim2real.identification.results.units import SI_UNITS
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.simulator.model import ClampedBand, LaunchHistory
 from sling2sim2real.simulator.parameters import EXTRA, Parameters
@@ -86,7 +86,7 @@ class Identified:
 
 
 def fit_posterior(
-    params: Params,
+    params: Settings,
     method: str,
     sling: ClampedBand,
     episodes: Sequence[Episode],

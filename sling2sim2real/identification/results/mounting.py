@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from sling2sim2real.base.schema import Direction, JsonRecord, Range, read_json
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 
@@ -19,7 +19,7 @@ class Mounting(JsonRecord):
 
 
 def load_sling(
-    params: Params,
+    params: Settings,
     band: str,
     clamps: Path | None,
     law: str = NEO_HOOKEAN,
@@ -40,7 +40,7 @@ def load_sling(
     return ClampedBand.of(params.bands[band], params.setup, params.sling, mounting, law=law)
 
 
-def sling_of_method(params: Params, band: str, method: str, clamps: Path | None) -> ClampedBand:
+def sling_of_method(params: Settings, band: str, method: str, clamps: Path | None) -> ClampedBand:
     """A band as a method of params.yaml takes it: with its law, mounted or not."""
     method_params = params.methods[method]
     return load_sling(params, band, clamps, method_params.law, mounted=method_params.mounting)

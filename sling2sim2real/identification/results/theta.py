@@ -26,7 +26,7 @@ from sling2sim2real.base.layout import NotMade
 from sling2sim2real.base.schema import JsonRecord, Name, Range, Section, read_json, refusal
 from sling2sim2real.identification.results.confidence import Confidence, Count
 from sling2sim2real.identification.results.mounting import load_sling
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import (
     LAWS,
     DampingScale,
@@ -133,18 +133,18 @@ def load_samples(path: Path, theta: Parameters) -> Parameters | None:
     return Parameters.named(theta.law, columns, theta.sample())
 
 
-def calibrated(params: Params, band: str, content: dict, clamps: Path | None) -> ClampedBand:
+def calibrated(params: Settings, band: str, content: dict, clamps: Path | None) -> ClampedBand:
     """The band that a θ file's content is of: of its law, with its clamps calibrated or not."""
     law, mounted = content.get("law", NEO_HOOKEAN), content.get("mounted", True)
     return load_sling(params, band, clamps, law, mounted=mounted)
 
 
-def launch_setup(params: Params, content: dict) -> LaunchSetup:
+def launch_setup(params: Settings, content: dict) -> LaunchSetup:
     """How the band of a θ file is launched."""
     return LaunchSetup.of(params.setup, params.sling, history_of(params, content))
 
 
-def history_of(params: Params, content: dict) -> LaunchHistory | None:
+def history_of(params: Settings, content: dict) -> LaunchHistory | None:
     """How a hand must draw the band of a θ file to launch it; None for a law without memory.
 
     As params.yaml's `launch` says, or else as the recording's hand did.

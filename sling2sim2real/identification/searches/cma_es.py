@@ -11,11 +11,11 @@ from sling2sim2real.identification.objective.box import SearchBox, reflect
 from sling2sim2real.identification.objective.evaluate import Evaluation
 from sling2sim2real.identification.search import Evaluate, run
 from sling2sim2real.identification.searches.regions import Region
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 
 
 def refine(
-    params: Params,
+    params: Settings,
     method: str,
     regions: Sequence[Region],
     evaluate: Callable[[np.ndarray], Evaluation],

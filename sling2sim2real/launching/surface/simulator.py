@@ -10,13 +10,13 @@ import numpy as np
 
 from sling2sim2real.base.machine import cores
 from sling2sim2real.identification.results.theta import calibrated, launch_setup, parameters_of
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.launch import Launches, launch
 from sling2sim2real.simulator.parameters import Parameters
 
 
 def asked_of_the_hand(
-    params: Params, band: str, content: dict, draw: np.ndarray, clamps: Path | None
+    params: Settings, band: str, content: dict, draw: np.ndarray, clamps: Path | None
 ) -> dict[str, float | None] | None:
     """How the hand must draw a band whose law remembers it, and what it costs not to.
 
@@ -39,7 +39,7 @@ def asked_of_the_hand(
 
 
 def simulator(
-    params: Params,
+    params: Settings,
     band: str,
     content: dict,
     clamps: Path | None,

@@ -19,7 +19,7 @@ from sling2sim2real.base.pool import Pool
 from sling2sim2real.launching.launches_file import CHECK, LaunchRow
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.spread import landing_intervals
-from sling2sim2real.settings import Params
+from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.launch import Launches, limited
 from sling2sim2real.simulator.parameters import Parameters
 
@@ -122,7 +122,7 @@ def predict(
     batches: list[Batch],
     launcher: Callable[..., Launches],
     samples: Parameters | None,
-    params: Params,
+    params: Settings,
 ) -> tuple[Launches, np.ndarray]:
     """What the calibrated simulator makes of the draws of all batches, N in all.
 

@@ -7,12 +7,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli import cli
 from sling2sim2real.cli.fit import fit as module
 from sling2sim2real.cli.fit.screen import shown
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS
 
 CARD = {

@@ -1,6 +1,6 @@
 """What docs/recording.md says of a plan is what params.yaml gives."""
 
-from sling2sim2real.settings import load
+from pipeline.params import load
 from tests.project import DEFAULTS, ROOT
 
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.plan.force import read_earlier
 from sling2sim2real.cli.plan.plan import plan_recording
 from sling2sim2real.cli.plan.trajectory import Trajectory
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS, with_
 from validation.recordings.bag import BASE, HAND, REST, Truth, write_bag
 

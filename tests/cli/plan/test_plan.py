@@ -11,13 +11,13 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
+from pipeline.params import Params, load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.plan import limits
 from sling2sim2real.cli.plan.force import Earlier, Held, predict
 from sling2sim2real.cli.plan.messages import COLUMNS
 from sling2sim2real.cli.plan.plan import plan_recording, with_band
 from sling2sim2real.cli.plan.trajectory import Phase, Trajectory
-from sling2sim2real.settings import Params, load, parse
 from sling2sim2real.settings.lab import Dip, Gripper
 from tests.project import DEFAULTS, with_
 
@@ -173,7 +173,7 @@ def test_a_position_that_is_none_is_refused(position) -> None:
     text = DEFAULTS.read_text()
     wrong = text.replace("position: finger}", f"position: {json.dumps(position)}}}")
     with pytest.raises(UserError, match=r"plan.gripper.position: must be finger, gap, or its numb"):
-        parse(wrong)
+        Params.parse(wrong)
 
 
 def test_without_a_base_the_plan_is_in_frame_o_and_says_so(params, tmp_path) -> None:

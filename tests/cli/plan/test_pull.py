@@ -7,11 +7,12 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
+from pipeline.params import load
 from sling2sim2real.cli.plan.pull import SPARE, TICK, catenary_sag, hanging_middle, trajectory_of
 from sling2sim2real.episode.planned import leg_time
 from sling2sim2real.episode.window import LEAD
 from sling2sim2real.recording.events import CALM
-from sling2sim2real.settings import PlanParams, load
+from sling2sim2real.settings import PlanParams
 from sling2sim2real.settings.lab import Dip
 from tests.project import DEFAULTS, with_
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.params import Params
 from sling2sim2real.cli.preflight.check import Look, band_of, look_at
 from sling2sim2real.recording.build import Processed, process
 from sling2sim2real.recording.events import Part
-from sling2sim2real.settings import Params
 from sling2sim2real.settings.lab import BandParams
 from tests.project import DEFAULTS
 from tests.recording.conftest import blind, masked, params, seen

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.preflight.add_band import add_band
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS, contents
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli.preflight.command import check
 from sling2sim2real.cli.preflight.recordings import add_recording
 from sling2sim2real.recording.build import build_episodes
-from sling2sim2real.settings import load
 from stages import episode
 from tests.cli.preflight.test_add_band import add
 from tests.project import contents

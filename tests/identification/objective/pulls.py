@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from pipeline.params import load
 from sling2sim2real.base.minimum_jerk import minimum_jerk
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.settings import load
 from sling2sim2real.simulator.model import ClampedBand, ClampValues
 from tests.project import DEFAULTS
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from pipeline.params import load
 from sling2sim2real.identification.objective.box import SearchBox, reflect
-from sling2sim2real.settings import load
 from sling2sim2real.settings.identification import LAWS
 from sling2sim2real.simulator.parameters import THETA
 from tests.project import DEFAULTS

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from pipeline.params import load
 from sling2sim2real.base.machine import gpus
 from sling2sim2real.base.native import start, wp
 from sling2sim2real.identification.objective.box import SearchBox
@@ -16,7 +17,6 @@ from sling2sim2real.identification.objective.chamfer import AROUND, LANES, RINGS
 from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.objective.kernel import clouds_kernel, terms_kernel
 from sling2sim2real.identification.objective.loss import TERMS, EpisodeLoss
-from sling2sim2real.settings import load
 from sling2sim2real.simulator.interaction import interact
 from sling2sim2real.simulator.parameters import Parameters
 from tests.identification.objective import toy

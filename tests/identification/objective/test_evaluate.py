@@ -6,11 +6,11 @@ from threading import Barrier
 import numpy as np
 import pytest
 
+from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.objective.loss import TERMS, EpisodeLoss
-from sling2sim2real.settings import load
 from sling2sim2real.simulator.parameters import THETA
 from tests.identification.objective import toy
 from tests.project import DEFAULTS

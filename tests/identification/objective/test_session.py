@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.params import load
 from sling2sim2real.base.progress import parse
 from sling2sim2real.identification.objective import session
-from sling2sim2real.settings import load
 from tests.identification.searches.functions import Evaluate, rosenbrock
 from tests.project import DEFAULTS
 

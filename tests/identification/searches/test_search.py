@@ -9,11 +9,11 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.params import Params, load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.identification.evaluations import Evaluations, theta_content
 from sling2sim2real.identification.objective.box import SearchBox, latin_hypercube
 from sling2sim2real.identification.search import explore, rollouts_of, run
-from sling2sim2real.settings import load, parse
 from tests.identification.searches import functions
 from tests.identification.searches.functions import (
     CENTRE,
@@ -226,7 +226,7 @@ REFUSED = (
 
 
 def with_search(name: str, **more):
-    params = parse(DEFAULTS.read_text(encoding="utf-8"))
+    params = Params.parse(DEFAULTS.read_text(encoding="utf-8"))
     method = params.methods["real2sim2real"].model_copy(update={"search": name, **more})
     return params.model_copy(update={"methods": {"mine": method}})
 

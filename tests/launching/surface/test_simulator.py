@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from pipeline.params import load
 from sling2sim2real.identification.results.theta import parameters_of
 from sling2sim2real.launching.surface.simulator import simulator
-from sling2sim2real.settings import load
 from sling2sim2real.simulator.parameters import THETA
 from tests.project import DEFAULTS, with_
 

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.params import load
 from sling2sim2real.launching.trials.trials import SCHEMA, Batch, launch_virtually, table
-from sling2sim2real.settings import load
 from sling2sim2real.simulator.launch import Launches, launch, limited
 from sling2sim2real.simulator.model import ClampedBand, LaunchSetup
 from sling2sim2real.simulator.parameters import Parameters

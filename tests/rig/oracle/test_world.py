@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
+from pipeline.params import load
 from rig.oracle.world import World
 from rig.physics.launch import launch
 from sling2sim2real.launching.surface.aim import NEAR
-from sling2sim2real.settings import load
 from tests.project import DEFAULTS
 
 DRAW = np.array([-0.31, -0.16])

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
+from pipeline.params import Params
+from pipeline.params.virtual_rig import RigFlow, RigSoftening, RigSpectrum
 from rig.physics.launch import POINTS, flight, fly, launch, launch_from
 from rig.physics.scene import ROD
 from rig.physics.world import bent_at, pulled, string_of
-from sling2sim2real.settings import Params
-from sling2sim2real.settings.virtual_rig import RigFlow, RigSoftening, RigSpectrum
 from tests.project import with_
 
 DRAW = (-0.30, -0.15)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from pipeline.params import Params
 from rig.physics.motion import OPEN, PULL, PULLED, HandMotion
 from rig.physics.world import string_of
 from rig.recorder.interaction import hang, pull_and_release
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.settings import Params
 from sling2sim2real.settings.lab import Dip
 from tests.project import with_
 

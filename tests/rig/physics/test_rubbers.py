@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from pipeline.params import Params
 from rig.physics.elasticity import Law, law_of
 from rig.physics.rubber import Rubber, spectrum
 from rig.physics.world import pulled, rubber_of, straight, string_of
-from sling2sim2real.settings import Params
 
 SHORTEST = 5e-4  # s, of the rig's spectra
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from pipeline.params import Params
 from rig.physics.motion import HandMotion
 from rig.physics.servo import Servo
-from sling2sim2real.settings import Params
 
 MASS, STIFFNESS, DAMPING = 5.0, 12000.0, 200.0
 

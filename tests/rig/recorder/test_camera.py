@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipeline.params import Params
 from rig.physics.scene import Mesh, tube
 from rig.recorder.camera import (
     AMBIENT,
@@ -15,7 +16,6 @@ from rig.recorder.camera import (
     nearer,
 )
 from rig.recorder.record import INSTANTS, MOST_INSTANTS, instants_of
-from sling2sim2real.settings import Params
 
 LINE = np.stack([np.linspace(-0.1, 0.1, 30), np.zeros(30), np.zeros(30)], axis=1)
 RADIUS = np.full(30, 0.005)

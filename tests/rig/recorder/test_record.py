@@ -9,11 +9,11 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
+from pipeline.params import Params
 from rig.recorder import camera
 from rig.recorder.interaction import Interaction
 from rig.recorder.record import INSTANTS, record
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.settings import Params
 from tests.project import with_
 from tests.rig.conftest import SCALE
 

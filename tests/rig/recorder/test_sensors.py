@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipeline.params import Params
 from rig.physics import launch as launches
 from rig.physics.motion import OPEN, HandMotion
 from rig.physics.robot import SENSOR_LEVER, Robot
@@ -11,7 +12,6 @@ from rig.recorder.camera import Exposure, VirtualCamera, measured_depth
 from rig.recorder.interaction import Interaction
 from rig.recorder.record import radius
 from rig.recorder.sensors import TOOL_CENTER, wrench
-from sling2sim2real.settings import Params
 
 COUNT = 20_000
 FORCE, ACCELERATION = np.array([1.0, 12.0, -3.0]), np.array([0.5, -2.0, 0.7])

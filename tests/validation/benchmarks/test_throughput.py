@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.params import load
 from sling2sim2real.base.native import start, wp
-from sling2sim2real.settings import load
 from sling2sim2real.simulator.interaction import interact
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters

@@ -6,7 +6,8 @@ from typing import Annotated
 
 from pydantic import model_validator
 
-from sling2sim2real.base.schema import FILLED, Name, Names, Section, refusal
+from sling2sim2real.base.schema import FILLED, LIST, Name, Names, Range, Section, refusal
+from sling2sim2real.settings.launches import Nodes
 
 PLAIN = "plain"  # the recording that gives its band's name to its stages
 UNIONS = {"explored": ("multistart", "posterior"), "pairs": ("multistart", "posterior", "search")}
@@ -95,3 +96,10 @@ class RunParams(Section):
                     f"pairs: lacks {key}-{self.main}: the card of a recording is by `main`"
                 )
         return self
+
+
+class FloorParams(Section):
+    """How far launches of an oracle policy miss: what no method can help."""
+
+    map_size: Annotated[tuple[Nodes, Nodes], LIST]
+    launches: Annotated[int, Range(0, 10_000)]  # a target, beside those with the trials' errors

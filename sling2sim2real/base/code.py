@@ -21,7 +21,6 @@ NESTED = (  # folders of folders: what lies in them is a concern by itself, be i
     "sling2sim2real/",
     "sling2sim2real/identification/",
     "sling2sim2real/identification/searches/",
-    "sling2sim2real/launching/",
     "pipeline/",
     "rig/",
 )

@@ -35,6 +35,7 @@ def write_params_of(
     content = yaml.load(DEFAULTS)
     content.update(run_of({band: [method]}, rig=False))
     content["bands"][band] = BAND | {"mass": mass}
+    content["rig"]["bands"][band] = None
     for name, values in sections.items():
         content[name].update(values)
     yaml.dump(content, root / "params.yaml")

@@ -74,7 +74,11 @@ class Copy(ProjectCopy):
         share_compiled(folder)
         run = run_of({"band1": METHODS, MINE: [OURS]})["run"]
         run |= {"floors": ["band1"], "rig": {"band1": run["recordings"]["band1"]}}
-        self.set(TINY | {"run": run, f"bands.{MINE}": BAND | {"mass": 0.023}})
+        self.set(
+            TINY
+            | {"run": run, f"bands.{MINE}": BAND | {"mass": 0.023}}
+            | {f"rig.bands.{MINE}": None}
+        )
         for band in ("band1", MINE):
             write_launches(folder / "data/launches" / f"{band}.csv", [])
         with (folder / "data/launches/band1.csv").open("a", encoding="utf-8") as file:
@@ -352,8 +356,8 @@ CHANGES = {
     "a size of a band": Change({f"bands.{MINE}.mass": 0.024}, {*OF_MINE, "report"}),
     "rig.bands.band1": Change(
         {"rig.bands.band1.viscosity": 0.0013},
-        {*of("band1", "record", "floor"), *TRIALS},
-        EVERYTHING - OF_MINE - of("band1", "record", "floor") - TRIALS | of(MINE, "card"),
+        {*of("band1", "record", "floor"), *(stage for stage in TRIALS if "band1" in stage)},
+        EVERYTHING - OF_MINE - of("band1", "record", "floor") - TRIALS,
     ),
     "plan.dips": Change(
         {"plan.dips": [{"at": 0.9, "depth": 0.2, "out_time": 1.0, "back_time": 1.0}]},

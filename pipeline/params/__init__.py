@@ -44,14 +44,22 @@ class Params(Settings):
                 where = "recordings alone" if key in run.rig else "rig"
                 source = self.bands[recording.band].source
                 raise refusal(f"run.{where}: wants {key}, whose band has source: {source}")
-        for recording in run.rig.values():
-            for name, defined in (("bands", self.rig.bands), ("recordings", self.rig.recordings)):
-                wanted = recording.band if name == "bands" else recording.recording
-                if wanted not in defined:
-                    raise refusal(f"rig.{name}: lacks {wanted}, which the rig is to record")
         for band in run.floors:
-            if band not in self.rig.bands or band not in self.bands:
+            if band not in self.bands or self.bands[band].source != "rig":
                 raise refusal(f"run.floors: {band} is no band of the rig")
+        return self
+
+    @model_validator(mode="after")
+    def _the_rig_knows_its_bands(self) -> Params:
+        """DVC wants the key of a lab's band too, whose launches the rig does not make."""
+        for band, sizes in self.bands.items():
+            if band not in self.rig.bands:
+                raise refusal(f"rig.bands: lacks {band}; of a band that a lab recorded it is empty")
+            if (self.rig.bands[band] is not None) != (sizes.source == "rig"):
+                raise refusal(f"rig.bands.{band}: does not fit to bands.{band}.source")
+        for recording in self.run.rig.values():
+            if recording.recording not in self.rig.recordings:
+                raise refusal(f"rig.recordings: lacks {recording.recording}")
         return self
 
     @model_validator(mode="after")

@@ -173,7 +173,7 @@ class RigParams(Section):
     draws: dict[str, Annotated[tuple[Value, Value], LIST, ASCENDING]]
     launch_draws: dict[str, Annotated[tuple[Value, Value], LIST, ASCENDING]]
     recordings: dict[Name, RigRecording]
-    bands: dict[Name, RigBand]
+    bands: dict[Name, RigBand | None]  # None: a lab recorded it
 
     @model_validator(mode="after")
     def _draws_are_of_keys(self) -> RigParams:

@@ -93,7 +93,9 @@ def record(
 
     clock = Clock(rig.camera.clock, clocks[3])
     still = camera.see(room(setup.fork_width, setup.fork_height, robot))
-    color, hand = rig.bands[band_name].color, interp1d(times, happened.hand, axis=0)
+    hidden, hand = rig.bands[band_name], interp1d(times, happened.hand, axis=0)
+    assert hidden is not None  # of a band of the rig
+    color = hidden.color
     for i, time in enumerate(frames):
         if i % REPORT_EVERY == 0:
             progress(f"picture {i} of {len(frames)}")

@@ -18,8 +18,8 @@ from sling2sim2real.base.schema import JsonRecord, Pose, read_json
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.mounting import Mounting
 from sling2sim2real.identification.results.theta import ThetaFile
-from sling2sim2real.identification.results.units import SI_UNITS
 from sling2sim2real.launching.surface.stored import Stored
+from sling2sim2real.quantities import QUANTITIES
 from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.model import LaunchHistory
 from sling2sim2real.simulator.parameters import Parameters
@@ -185,7 +185,7 @@ def _intervals(theta: dict, confidence: dict) -> dict[str, Interval]:
     result = {}
     for name, parameter in confidence["parameters"].items():
         ends = parameter["low"], parameter["high"], parameter["identifiable"]
-        result[name] = Interval(theta[name], *ends, SI_UNITS.get(name, ""))
+        result[name] = Interval(theta[name], *ends, QUANTITIES[name].si)
     for name, parameter in confidence["derived"].items():
         value, low, high = (float(parameter[key]) for key in ("value", "low", "high"))
         result[name] = Interval(value, low, high, True, parameter["unit"])

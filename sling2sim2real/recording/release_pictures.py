@@ -59,8 +59,11 @@ class ReleasePictures:
 
     @property
     def beyond(self) -> float:
-        """Least amount by which the stamps are off for sure [s]; 0 where they may be right."""
-        return 0.0 if self.never else self.off(0.0)
+        """Least amount by which the stamps are off for sure [s]; 0 where they may be right.
+
+        Pictures in which the band comes and goes tell nothing of a clock.
+        """
+        return 0.0 if self.never or self.again else self.off(0.0)
 
     def off(self, late: float) -> float:
         """How far a delay is outside of what the pictures allow [s]; 0 within."""
@@ -93,7 +96,7 @@ def release_pictures(pull: Pull, fork_width: float) -> ReleasePictures | None:
     counts, times, repeated = [], [], []
     for k in (*before, *around):
         depth = recording.depth_picture(int(k))
-        if depth is None:
+        if depth is None or not depth.any():  # an emitter that is off, say
             continue
         if last is not None and np.array_equal(depth, last):
             repeated.append(float(since[k]))

@@ -295,6 +295,10 @@ CURE = "publish it as 16UC1 in millimetres or 32FC1 in metres, of the byte order
 def why_no_band(view: View) -> str:
     """What of the camera does not go with what is known of the hand, "" where all does."""
     camera = view.recording.depth_camera
+    looked = [view.depth(k) for k in np.linspace(0, len(view) - 1, LOOKS).astype(int)]
+    blank = sum(depth is not None and not depth.any() for depth in looked)
+    if len(looked) / 4 < blank < len(looked):
+        return f"{blank} of {LOOKS} depth pictures hold no depth at all: does the emitter blink?"
     size = np.array([camera.width, camera.height])
     center = camera.matrix[[0, 1], 2]
     if np.any(np.abs(center / size - 0.5) > OFF_CENTER):

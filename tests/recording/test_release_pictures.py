@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sling2sim2real.recording import images
 from sling2sim2real.recording.checks import _of_release as of_release
 from sling2sim2real.recording.delays import correct_delays
 from sling2sim2real.recording.events import Pull
+from sling2sim2real.recording.messages import Picture
 from sling2sim2real.recording.release_pictures import ReleasePictures, release_pictures
 from tests.recording.conftest import pull_of
 
@@ -56,6 +58,18 @@ def test_old_pictures_over_the_release_are_refused() -> None:
     ):
         (message,) = of_release(odd)
         assert message.about == "release_pictures" and message.refused
+
+
+def test_pictures_without_depth_or_in_disorder_make_no_delay_up(pull, params) -> None:
+    """Of an emitter that is switched on and off every second one is empty."""
+    depth = pull.recording.depth
+    nothing = np.zeros_like(images.depth(depth.values[0]))
+    blank = Picture("32FC1", "", nothing.view(np.uint8).ravel(), *nothing.shape, nothing.strides[0])
+    values = [blank if k % 2 else picture for k, picture in enumerate(depth.values)]
+    flickers = replace(pull.recording, depth=replace(depth, values=values))
+    pictures = release_pictures(replace(pull, recording=flickers), params.setup.fork_width)
+    assert pictures.earliest <= 0 <= pictures.latest and not pictures.again
+    assert replace(SOUND, drawn=-0.3, gone=-0.27, latest=-0.27, again=(-0.2,)).beyond == 0
 
 
 def test_a_band_that_is_never_let_go_is_refused(pull, params) -> None:

@@ -60,11 +60,11 @@ def test_an_odometry_and_one_pose_of_several(params) -> None:
         }
         for k in range(COUNT)
     ]
-    for kind, hand in (("nav_msgs/Odometry", odometry), ("foxglove.PosesInFrame", poses)):
-        frame, values = played(chosen(params, wrench("/ft"), channel("/hand", kind, hand))["pose"])
+    for kind, sent in (("nav_msgs/Odometry", odometry), ("foxglove.PosesInFrame", poses)):
+        frame, values = played(chosen(params, wrench("/ft"), channel("/hand", kind, sent))["pose"])
         assert frame == "base"
         assert_poses(values)
-    assert chosen(params, wrench("/ft"), pose("/a"), channel("/ee", kind, messages))["pose"].channel
+    assert chosen(params, wrench("/ft"), pose("/a"), channel("/ee", kind, sent))["pose"].channel
     several = [{**message, "poses": 2 * message["poses"]} for message in poses]
     with pytest.raises(UserError, match="/hand has fewer than two readable messages"):
         chosen(params, wrench("/ft"), channel("/hand", "foxglove.PosesInFrame", several))

@@ -151,7 +151,8 @@ REFUSED = [
         NEW,
         "run: explored: must be {<<: [*multistart, *posterior]}",
     ),
-    ("rig.recordings", {}, "rig.recordings: lacks plain, which the rig is to record"),
+    ("rig.recordings", {}, "rig.recordings: lacks plain"),
+    ("rig.bands.band1", None, "rig.bands.band1: does not fit to bands.band1.source"),
     ("rig.recordings.dips.pull", "long", "rig.recordings.dips.pull: must be 'paper' or 'info"),
     ("rig.bands", {}, "rig.bands: lacks band1"),
     ("rig.bands.band1.law", "mooney", "rig.bands.band1.law: must be 'ogden'"),
@@ -217,6 +218,8 @@ ORANGE = {"band": "orange", "recording": "plain"}
 def test_a_recording_of_ones_own_needs_its_pair_by_the_main_method() -> None:
     content = copy.deepcopy(CONTENT)
     content["bands"]["orange"] = BAND
+    assert "rig.bands: lacks orange; of a band that a lab recorded it is empty" in refusal(content)
+    content["rig"]["bands"]["orange"] = None
     content["run"]["recordings"]["orange"] = ORANGE
     assert "pairs: lacks orange-posterior" in refusal(content)
     pair = {"orange-posterior": ORANGE | {"method": "posterior"}}

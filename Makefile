@@ -36,10 +36,12 @@ test-all: setup       # all tests but the campaigns: slow ones too, and ten time
 durations: setup      # which tests take more than three CPU-seconds and are not marked slow
 	.venv/bin/python -m pytest -p tests.durations
 
-lint: setup           # ruff: rules and format; basedpyright: types; codespell; code lines by folder
+lint: setup           # ruff; basedpyright: types; import-linter and deptry: who imports what; codespell; code lines
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/basedpyright
+	.venv/bin/lint-imports
+	.venv/bin/deptry .
 	.venv/bin/codespell
 	.venv/bin/python tools/size.py
 

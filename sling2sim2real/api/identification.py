@@ -31,9 +31,9 @@ from sling2sim2real.identification.results.theta import (
     load_theta,
     parameters_of,
 )
-from sling2sim2real.identification.results.units import SI_UNITS
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.stretch import recorded_stretch
+from sling2sim2real.quantities import QUANTITIES
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.settings.provenance import changed_since
@@ -281,7 +281,7 @@ def _intervals(content: dict, summary: dict) -> dict[str, Interval]:
     """Intervals by name, from a θ file's content and its confidence."""
     result = {}
     for name, parameter in summary["parameters"].items():
-        value, unit = content["theta"][name], SI_UNITS.get(name, "")
+        value, unit = content["theta"][name], QUANTITIES[name].si
         result[name] = Interval(
             value, parameter["low"], parameter["high"], parameter["identifiable"], unit
         )

@@ -64,13 +64,17 @@ def imports(file: Path, root: Path = ROOT) -> set[Path]:
 
 
 def closure(script: Path, root: Path = ROOT) -> list[str]:
-    """All project files that `script` may run, itself included, sorted, relative to `root`."""
+    """All project files that `script` may run, itself included, sorted, relative to `root`.
+
+    What only UNTRACKED files import checks values of params.yaml, and is left out.
+    """
     seen: set[Path] = set()
     queue = {script}
     while queue:
         file = queue.pop()
         seen.add(file)
-        queue |= imports(file, root) - seen
+        if not file.relative_to(root).as_posix().startswith(UNTRACKED):
+            queue |= imports(file, root) - seen
     native = {
         beside for file in seen for beside in file.parent.iterdir() if beside.suffix in NATIVE
     }

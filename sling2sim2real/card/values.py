@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sling2sim2real.identification.posterior.coordinates import MOST_DRAG, MOST_LOST
+from sling2sim2real.parameters import parameters
 from sling2sim2real.quantities import QUANTITIES, rounded
 from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.parameters import EXTRA
@@ -82,9 +82,11 @@ def boxes(params: Settings, method: str) -> dict[str, SearchedRange]:
     config = params.methods[method]
     ranges = {name: SearchedRange(box.low, box.high, box.scale) for name, box in params.parameters}
     ranges |= {name: SearchedRange(*ends) for name, ends in config.bounds.items()}
-    ranges |= {
-        "air_drag": SearchedRange(0.0, MOST_DRAG),
-        "turn_damping": SearchedRange(0.0, 1.0),
-        "returned_share": SearchedRange(np.exp(-MOST_LOST), np.exp(MOST_LOST), "log"),
-    }
+    for row in parameters(config.law):
+        if row.coordinate and row.coordinate.bounds:
+            low, high = row.coordinate.bounds
+            if row.coordinate.log:
+                low, high = float(np.exp(low)), float(np.exp(high))
+            scale = "log" if row.coordinate.log else "linear"
+            ranges[row.name] = SearchedRange(low, high, scale)
     return {name: box for name, box in ranges.items() if name not in config.fixed}

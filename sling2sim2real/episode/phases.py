@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.episode import Episode
@@ -144,6 +143,8 @@ def _names(time: np.ndarray, drawn: np.ndarray, slack: float) -> np.ndarray:
     size = max(3, 2 * round(SPEED / period / 2) + 1)
     if len(drawn) < size:
         return names
+    from scipy.signal import savgol_filter  # which takes half a second
+
     speed = np.asarray(savgol_filter(drawn, size, 1, deriv=1, delta=period))
     slow = np.abs(speed) < STILL
     slow &= names != SLACK

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from sling2sim2real.exporting.band import CalibratedBand
-from sling2sim2real.identification.results.units import SI_UNITS
 from sling2sim2real.quantities import QUANTITIES, rounded
 from sling2sim2real.simulator.rubber import RUBBER
 
@@ -29,7 +28,7 @@ def values(model: CalibratedBand) -> list[dict]:
             {
                 "name": name,
                 "value": rounded(value, 6),
-                "unit": SI_UNITS.get(name, ""),
+                "unit": QUANTITIES[name].si,
                 "low": sure and rounded(sure.low, 6),
                 "high": sure and rounded(sure.high, 6),
                 "identified": bool(sure and sure.identifiable),

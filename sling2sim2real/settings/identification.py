@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Generic, Literal, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
-from pydantic import AfterValidator, model_validator
+from pydantic import AfterValidator, create_model, model_validator
 
 from sling2sim2real.base.imported import is_import
 from sling2sim2real.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
+from sling2sim2real.parameters import THETA, Parameter, added_by, parameters
 
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound", bound=float)
 KTop = Annotated[int, Range(1, 50)]
 Law = Literal["neo_hookean", "rubber", "corotated"]  # of the band's material
-# What each has beside the five, and how far its box may reach.
-LAWS: dict[str, dict[str, tuple[float, float]]] = {
-    "neo_hookean": {},
-    "rubber": {
-        "mooney_share": (-1.0, 1.0),
-        "upturn": (0.0, 1.0),
-        "softening": (0.0, 0.9),
-        "relaxation": (0.0, 0.2),
-        "flow": (0.0, 1.0),
-        "log_flow_rate": (-1.0, 6.0),
-    },
-    "corotated": {},
-}
+# What each has beside the parameters of every law, and how far its box may reach.
+LAWS = {law: added_by(law) for law in get_args(Law)}
 POSTERIOR, PAPER = "posterior", "paper"
-UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
+UNSEEN = tuple(  # what a pull does not show
+    row.name for row in parameters("neo_hookean") if row.coordinate is None
+)
 SEARCHES = ("multistart", POSTERIOR, "de", "bo", "adam")
 OWN = "own"  # any other: a function of the user's
 OUR_ENGINE = "sling"
@@ -68,25 +60,17 @@ class Box(Section, Generic[Bound]):
         return self
 
 
-YoungsModulus = Annotated[float, Range(1e3, 1e9)]
-PoissonsRatio = Annotated[float, Range(0, 0.495)]
-ElasticityDamping = Annotated[float, Range(1e-6, 1)]
-DynamicFriction = Annotated[float, Range(0, 5)]
-DampingScale = Annotated[float, Range(0, 1)]
+def _axis(row: Parameter) -> Any:
+    kind = Box[Annotated[float, Range(*row.reach)]]
+    low, high = row.box
+    return kind, kind(low=low, high=high, scale=row.scale)
 
 
-class ParameterBoxes(Section):
-    youngs_modulus: Box[YoungsModulus] = Box[YoungsModulus](
-        low=30000.0, high=10000000.0, scale="log"
-    )
-    poissons_ratio: Box[PoissonsRatio] = Box[PoissonsRatio](low=0.3, high=0.49, scale="linear")
-    elasticity_damping: Box[ElasticityDamping] = Box[ElasticityDamping](
-        low=0.0001, high=0.05, scale="log"
-    )
-    dynamic_friction: Box[DynamicFriction] = Box[DynamicFriction](
-        low=0.05, high=1.0, scale="linear"
-    )
-    damping_scale: Box[DampingScale] = Box[DampingScale](low=0.0, high=1.0, scale="linear")
+_BOXES = {row.name: _axis(row) for row in parameters("neo_hookean") if row.name in THETA}
+
+
+class ParameterBoxes(create_model("_ParameterBoxes", __base__=Section, **_BOXES)):
+    """The box of each of THETA."""
 
 
 class LossParams(Section):
@@ -225,22 +209,15 @@ METHODS = {
     POSTERIOR: MethodParams(  # ours: the mode of one density over all recordings and launches
         search=POSTERIOR,
         law="rubber",
-        fixed={"poissons_ratio": 0.47, "dynamic_friction": 0.8, "damping_scale": 0.6},
-        bounds={
-            "mooney_share": (-0.3, 0.9),
-            "upturn": (0.0, 0.3),
-            "softening": (0.0, 0.6),
-            "relaxation": (0.0, 0.2),
-            "flow": (0.0, 0.6),
-            "log_flow_rate": (0.0, 5.0),
-        },
+        fixed={row.name: row.fixed for row in parameters("rubber") if row.fixed is not None},
+        bounds={row.name: row.box for row in parameters("rubber") if row.law},
     ),
 }
 
 
 def parameter_names(law: str) -> tuple[str, ...]:
-    """The parameters of a law, in the order of all tables: θ, then what the law adds."""
-    return (*ParameterBoxes.model_fields, *LAWS[law])
+    """What a search of a law may search, in the order of all tables: THETA, then what it adds."""
+    return (*THETA, *LAWS[law])
 
 
 def check_method(

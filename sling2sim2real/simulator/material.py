@@ -1,6 +1,6 @@
 """The material law: what the native text takes for its parameters θ.
 
-A law has four places: its parameters in LAWS (params/identification.py), its coefficients here
+A law has four places: its rows in parameters.py, its coefficients here
 (named in records.py), its stress and their derivative by the deformation gradient in material.h,
 and the rod's bending and twist in rod.h. Whoever adds one writes it a second time in
 validation/simulator/reference.py.

@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
-from sling2sim2real.settings.identification import parameter_names
+from sling2sim2real.parameters import THETA, parameters
 
-THETA = (
-    "youngs_modulus",
-    "poissons_ratio",
-    "elasticity_damping",
-    "dynamic_friction",
-    "damping_scale",
+EXTRA = tuple(  # of every law, after its own
+    row.name for row in parameters("neo_hookean") if row.name not in THETA
 )
-EXTRA = "air_drag", "turn_damping", "returned_share"  # of every law, after its own
-UNSAID = {"returned_share": 1.0}  # what is not given; of any other but THETA, 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +54,10 @@ class Parameters:
         Raises:
             ValueError: A name is not one of the law, or one of THETA is missing.
         """
-        given, names = {**(others or {}), **columns}, names_of(law)
-        if unknown := {*given} - {*names} | {*THETA} - {*given}:
+        given, rows = {**(others or {}), **columns}, parameters(law)
+        if unknown := {*given} - {row.name for row in rows} | {*THETA} - {*given}:
             raise ValueError(f"of the law {law}: {', '.join(sorted(unknown))}")
-        chosen = (given.get(name, UNSAID.get(name, 0.0)) for name in names)
+        chosen = (given.get(row.name, row.default) for row in rows)
         values = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, float)) for value in chosen))
         return cls(law, np.stack(values, axis=1))
 
@@ -101,6 +96,7 @@ class Parameters:
         return Parameters(self.law, np.broadcast_to(self.values, (count, len(self.names))))
 
 
+@cache
 def names_of(law: str) -> tuple[str, ...]:
     """All parameters of a law."""
-    return (*parameter_names(law), *EXTRA)
+    return tuple(row.name for row in parameters(law))

@@ -12,7 +12,8 @@ from pipeline.report.tables.cells import NONE, Table, number, percent
 from pipeline.report.tables.parameters import exactly, printed_loss
 from sling2sim2real.drawing.names import as_code, cell
 from sling2sim2real.drawing.styles import Styles
-from sling2sim2real.quantities import QUANTITIES, Quantity, coordinate
+from sling2sim2real.parameters import Quantity
+from sling2sim2real.quantities import QUANTITIES, coordinate
 from sling2sim2real.settings.identification import POSTERIOR
 
 SEARCHES = {
@@ -62,7 +63,7 @@ def derived(results: Results, styles: Styles) -> Table | None:
     quantities = {name: quantity for name, quantity in QUANTITIES.items() if name in present}
     for name in sorted(present.keys() - quantities):
         words = name.replace("_", " ")
-        quantities[name] = Quantity(words, words, present[name]["unit"])
+        quantities[name] = Quantity(name, words, words, present[name]["unit"])
     rows = []
     for result in shown:
         entries = result.confidence["derived"]

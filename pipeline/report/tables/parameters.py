@@ -15,7 +15,6 @@ from pipeline.report.tables.benchmark import PAPER, band_name, method_name, orde
 from pipeline.report.tables.cells import NONE, Table, number
 from sling2sim2real.drawing.styles import Styles
 from sling2sim2real.identification.objective.box import SearchBox
-from sling2sim2real.identification.results.units import SI_UNITS
 from sling2sim2real.quantities import QUANTITIES
 from sling2sim2real.settings.identification import LAWS
 from sling2sim2real.simulator.parameters import THETA
@@ -175,7 +174,7 @@ def records(rows: list[IdentifiedRow]) -> pd.DataFrame:
         line = {"band": row.band, "method": row.method, "source": row.source}
         for name in _shown(rows):
             value_of = row.values.get(name, Value(math.nan))
-            unit = f"_{SI_UNITS[name].lower()}" if name in SI_UNITS else ""
+            unit = f"_{QUANTITIES[name].si.lower()}" if QUANTITIES[name].si else ""
             for part, value in (
                 ("", value_of.value),
                 ("_low", value_of.low),

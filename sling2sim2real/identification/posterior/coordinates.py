@@ -17,52 +17,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import truncnorm
 
+from sling2sim2real.parameters import Coordinate, Parameter, parameters
 from sling2sim2real.settings import Settings
-from sling2sim2real.settings.identification import LAWS
 from sling2sim2real.simulator.model import ClampedBand
-from sling2sim2real.simulator.parameters import THETA, Parameters
+from sling2sim2real.simulator.parameters import Parameters
 
-YOUNG, POISSON, DAMPING, FRICTION, SCALE = range(5)
-LOGS = "log_youngs_modulus", "log_loss_factor"  # of Pa
 LOSS = 1  # place of the loss factor among the coordinates
-RETURNED = "log_returned_share"
-SHOWN_BY = {  # coordinates of parameters that have another name
-    "youngs_modulus": LOGS[0],
-    "elasticity_damping": LOGS[1],
-    "damping_product": LOGS[1],
-    "returned_share": RETURNED,
-}
-STEPS = {  # of finite differences
-    "log_youngs_modulus": 0.005,
-    "log_loss_factor": 0.05,
-    "mooney_share": 0.02,
-    "upturn": 0.01,
-    "softening": 0.02,
-    "relaxation": 0.004,
-    "flow": 0.01,
-    "log_flow_rate": 0.03,
-    "air_drag": 0.25,
-    "turn_damping": 0.1,
-    "log_returned_share": 0.01,
-}
-# Of 9 in 10 rubbers at 10 to 100 Hz: the range from butadiene to butyl rubber, by
-# https://materialmap.github.io/rubber_damping_reference.html.
-# A band with both ends held swings at pi c/L, where its damping s d makes tan delta = pi s d c/L.
-TAN_DELTA = 0.03, 0.50
-MOST_DRAG, MOST_LOST = 8.0, 0.3  # 1/s, of a logarithm
-PRIORS = {  # mean and standard deviation of Gaussians
-    "log_loss_factor": (
-        np.log(np.sqrt(np.prod(TAN_DELTA)) / np.pi),
-        np.log(TAN_DELTA[1] / TAN_DELTA[0]) / 2 / 1.645,
-    ),
-    # half-normals: slow cycles of elastomers return 64 to 82 % (10.5281/zenodo.14717689), by
-    # softening alone 1 - 0.59 s, and by flow alone 1 - 2 flow or more
-    "softening": (0.0, 0.3),
-    "flow": (0.0, 0.15),
-    "log_flow_rate": (2.0, 1.0),  # a stress of E/5 flows in a second, within a decade
-    "air_drag": (0.0, 1.0),  # a half-normal: little beside the cylinder's drag
-    "log_returned_share": (0.0, 0.015),  # the law's discrepancy, common to a band's launches
-}
+DAMPING, PRODUCT = "elasticity_damping", "damping_product"
+
+
+def shown(law: str) -> dict[str, tuple[Parameter, Coordinate]]:
+    """What coordinates show of a law's parameters, by the coordinates' names, in their order."""
+    return {row.shown_by: (row, row.coordinate) for row in parameters(law) if row.coordinate}
 
 
 @dataclass(frozen=True)
@@ -94,30 +60,33 @@ class Coordinates:
         The method is of params.yaml and searches by least squares.
         """
         method_params = params.methods[method]
-        box = {name: (axis.low, axis.high) for name, axis in params.parameters} | dict(
-            method_params.bounds
-        )
-        young, damping = (box[THETA[i]] for i in (YOUNG, DAMPING))
-        product = np.array(damping) * method_params.fixed["damping_scale"]
+        box = {name: (axis.low, axis.high) for name, axis in params.parameters}
+        box |= dict(method_params.bounds)
         wave = np.sqrt(sling.rest_length * sling.mass / sling.area)
-        loss = np.log(product / wave) + np.log(young) / 2
-        ends = dict(zip(LOGS, (np.log(young), loss), strict=True))
-        ends |= {
-            name: box[name] for name in LAWS[method_params.law] if name not in method_params.fixed
-        } | {
-            "air_drag": (0.0, MOST_DRAG),
-            "turn_damping": (0.0, 1.0),
-            "log_returned_share": (-MOST_LOST, MOST_LOST),
+        young, fixed = box["youngs_modulus"], dict(method_params.fixed)
+        rows = {
+            name: both
+            for name, both in shown(method_params.law).items()
+            if both[0].name not in fixed
         }
-        low, high = np.array(list(ends.values()), float).T
-        expected, spread = np.array([PRIORS.get(name, (0.0, np.inf)) for name in ends]).T
-        names, fixed = tuple(ends), dict(method_params.fixed)
-        return cls(method_params.law, names, low, high, fixed, float(wave), expected, spread**-2)
+        ends = []
+        for row, coordinate in rows.values():
+            bounds = coordinate.bounds or box[row.name]
+            if row.name == DAMPING:
+                product = np.array(bounds) * fixed["damping_scale"]
+                bounds = np.log(product / wave) + np.log(young) / 2
+            elif coordinate.log and coordinate.bounds is None:
+                bounds = np.log(bounds)
+            ends.append(bounds)
+        priors = [coordinate.prior or (0.0, np.inf) for _, coordinate in rows.values()]
+        (low, high), (expected, spread) = np.array(ends, float).T, np.array(priors).T
+        law, names = method_params.law, tuple(rows)
+        return cls(law, names, low, high, fixed, float(wave), expected, spread**-2)
 
     @property
     def steps(self) -> np.ndarray:
         """Steps of finite differences, shape (D,)."""
-        return np.array([STEPS[name] for name in self.names])
+        return np.array([shown(self.law)[name][1].step for name in self.names])
 
     def differences(self, phi: np.ndarray) -> np.ndarray:
         """Steps of finite differences from coordinates (D,), away from the upper bounds."""
@@ -138,34 +107,33 @@ class Coordinates:
 
     def shows(self, name: str) -> int | None:
         """Number of the coordinate that a parameter shows; None: it is fixed."""
-        coordinate = SHOWN_BY.get(name, name)
-        return self.names.index(coordinate) if coordinate in self.names else None
+        name = DAMPING if name == PRODUCT else name
+        names = [row.name for row, _ in shown(self.law).values() if row.shown_by in self.names]
+        return names.index(name) if name in names else None
 
     def parameters(self, phi: np.ndarray) -> Parameters:
         """N parameters of coordinates (N, D)."""
-        columns = dict(zip(self.names, phi.T, strict=True))
-        young, loss, returned = (columns.pop(name) for name in (*LOGS, RETURNED))
-        product = np.exp(loss - young / 2) * self.wave
-        return Parameters.named(
-            self.law,
-            {
-                **columns,
-                THETA[YOUNG]: np.exp(young),
-                THETA[DAMPING]: product / self.fixed["damping_scale"],
-                "returned_share": np.exp(returned),
-            },
-            self.fixed,
-        )
+        coordinates, columns = dict(zip(self.names, phi.T, strict=True)), {}
+        for name, values in coordinates.items():
+            row, coordinate = shown(self.law)[name]
+            columns[row.name] = np.exp(values) if coordinate.log else values
+        # of the loss factor s d c/L, the damping time d
+        columns[DAMPING] = columns[DAMPING] * self.wave / self.fixed["damping_scale"]
+        columns[DAMPING] /= np.sqrt(columns["youngs_modulus"])
+        return Parameters.named(self.law, columns, self.fixed)
 
     def of(self, parameters: Parameters) -> np.ndarray:
         """Coordinates (D,) of one sample of what is searched, within the bounds.
 
         What is beside that (EXTRA) is as expected.
         """
-        phi, theta = self.expected.copy(), parameters.values[0]
-        loss = theta[DAMPING] * self.fixed["damping_scale"] * np.sqrt(theta[YOUNG]) / self.wave
-        phi[:2] = np.log(theta[YOUNG]), np.log(loss)
-        for name in LAWS[self.law]:
-            if name in self.names:
-                phi[self.names.index(name)] = parameters.column(name)[0]
+        phi = self.expected.copy()
+        for place, name in enumerate(self.names):
+            row, coordinate = shown(self.law)[name]
+            if coordinate.bounds is None:
+                value = parameters.column(row.name)[0]
+                if row.name == DAMPING:
+                    young = parameters.column("youngs_modulus")[0]
+                    value *= self.fixed["damping_scale"] * np.sqrt(young) / self.wave
+                phi[place] = np.log(value) if coordinate.log else value
         return np.clip(phi, self.low, self.high)

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sling2sim2real.identification.posterior.coordinates import PRIORS
+from sling2sim2real.identification.posterior.coordinates import DAMPING
+from sling2sim2real.parameters import TABLE, Parameter
 
-LOGS = "youngs_modulus", "elasticity_damping", "returned_share"  # whose logarithms are Gaussian
 HALF_NORMAL = 1 - 2 / np.pi  # its variance, of a normal's
-HALF = "air_drag", "softening", "flow"  # are not below 0
+EVEN = 1 / 12  # of a range
 LEAST = 1e-9  # of a column that the samples vary
 
 
@@ -108,30 +108,33 @@ class LandingModel:
 
     def _prior(self) -> np.ndarray:
         """Precision (D, D) of what is known without any pull; a bound tells as its own spread."""
-        precision, place = np.zeros_like(self.covariance), self.names.index
-        # of the coordinates' priors in the unknowns
-        directions = {name: {name: 1.0} for name in PRIORS} | {
-            "log_loss_factor": {"elasticity_damping": 1.0, "youngs_modulus": 0.5},
-            "log_returned_share": {"returned_share": 1.0},
-        }
-        for name, parts in directions.items():
-            if not set(parts) <= set(self.names):
+        precision = np.zeros_like(self.covariance)
+        for row in TABLE:
+            if not (isinstance(row, Parameter) and row.coordinate and row.name in self.names):
                 continue
-            direction = np.zeros(len(self.names))
-            for part, weight in parts.items():
-                direction[place(part)] = weight
-            variance = PRIORS[name][1] ** 2 * (HALF_NORMAL if name in HALF else 1.0)
+            direction = np.zeros(len(self.names))  # of the coordinate in the unknowns
+            direction[self.names.index(row.name)] = 1.0
+            if row.name == DAMPING:  # by the loss factor s d c/L, c^2 proportional to E
+                if "youngs_modulus" not in self.names:
+                    continue
+                direction[self.names.index("youngs_modulus")] = 0.5
+            if row.coordinate.prior:
+                variance = row.coordinate.prior[1] ** 2
+                variance *= HALF_NORMAL if row.coordinate.half else 1.0
+            elif row.coordinate.bounds:
+                variance = EVEN * np.ptp(row.coordinate.bounds) ** 2
+            else:  # within a method's box
+                continue
             precision += np.outer(direction, direction) / variance
-        if "turn_damping" in self.names:  # even between 0 and 1
-            precision[place("turn_damping"), place("turn_damping")] += 12.0
         return precision
 
 
 def unknowns(names: Sequence[str], samples: np.ndarray) -> dict[str, np.ndarray]:
     """Columns (M,) of samples (M, P) that vary, as they are Gaussian."""
-    columns = {}
+    columns, rows = {}, {row.name: row for row in TABLE if isinstance(row, Parameter)}
     for name, column in zip(names, samples.T, strict=True):
-        column = np.log(column) if name in LOGS else column
+        coordinate = rows[name].coordinate
+        column = np.log(column) if coordinate and coordinate.log else column
         if len(column) and np.ptp(column) > LEAST:
             columns[name] = column
     return columns

@@ -28,7 +28,7 @@ from sling2sim2real.identification.posterior.likelihood import SIMULATED, Failed
 from sling2sim2real.identification.posterior.residuals import BINS, LEAST_POINTS
 from sling2sim2real.identification.posterior.sampling import SAMPLES, Remaining, samples_of
 from sling2sim2real.identification.results.theta import content_of
-from sling2sim2real.identification.results.units import SI_UNITS
+from sling2sim2real.parameters import TABLE
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.simulator.model import ClampedBand, LaunchHistory
@@ -36,6 +36,7 @@ from sling2sim2real.simulator.parameters import EXTRA, Parameters
 from sling2sim2real.simulator.rubber import RUBBER
 
 LEVEL = 0.9
+SI_UNITS = {row.name: row.si for row in TABLE}
 WIDER = 1.2  # times the usual spread: less changes no interval by much
 FILLS = 2 / 3  # of the prior's interval: one as wide tells nothing
 
@@ -210,7 +211,7 @@ def confidence(identified: Identified) -> dict:
             entry["fixed"] = True
         parameters[name] = entry
     derived = {
-        name: _told(columns[name], mode[name], SI_UNITS.get(name, "")) | priors[name]
+        name: _told(columns[name], mode[name], SI_UNITS[name]) | priors[name]
         for name in (*EXTRA, product)
     }
     derived |= _clocks(identified)

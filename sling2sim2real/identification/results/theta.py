@@ -19,47 +19,41 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import create_model, model_validator
 
 from sling2sim2real.base.errors import printable
 from sling2sim2real.base.layout import NotMade
 from sling2sim2real.base.schema import JsonRecord, Name, Range, Section, read_json, refusal
 from sling2sim2real.identification.results.confidence import Confidence, Count
 from sling2sim2real.identification.results.mounting import load_sling
+from sling2sim2real.parameters import TABLE, Parameter
 from sling2sim2real.settings import Settings
-from sling2sim2real.settings.identification import (
-    LAWS,
-    DampingScale,
-    DynamicFriction,
-    ElasticityDamping,
-    Law,
-    PoissonsRatio,
-    YoungsModulus,
-    parameter_names,
-)
+from sling2sim2real.settings.identification import LAWS, Law, parameter_names
 from sling2sim2real.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from sling2sim2real.simulator.parameters import EXTRA, THETA, Parameters
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN, RUBBER
 
+REACH = {row.name: row.reach for row in TABLE if isinstance(row, Parameter)}
 
-class ThetaValues(Section):
+
+def _field(row: Parameter) -> Any:
+    kind = Annotated[float, Range(*row.reach)]
+    return kind if row.default is None else (kind, row.default)
+
+
+_FIELDS: dict[str, Any] = {
+    row.name: _field(row)
+    for row in TABLE
+    if isinstance(row, Parameter) and (row.name in THETA or row.law)
+}
+
+
+class ThetaValues(create_model("_ThetaValues", __base__=Section, **_FIELDS)):
     """The five, and what the law adds."""
-
-    youngs_modulus: YoungsModulus
-    poissons_ratio: PoissonsRatio
-    elasticity_damping: ElasticityDamping
-    dynamic_friction: DynamicFriction
-    damping_scale: DampingScale
-    mooney_share: Annotated[float, Range(*LAWS[RUBBER]["mooney_share"])] = 0.0
-    upturn: Annotated[float, Range(*LAWS[RUBBER]["upturn"])] = 0.0
-    softening: Annotated[float, Range(*LAWS[RUBBER]["softening"])] = 0.0
-    relaxation: Annotated[float, Range(*LAWS[RUBBER]["relaxation"])] = 0.0
-    flow: Annotated[float, Range(*LAWS[RUBBER]["flow"])] = 0.0
-    log_flow_rate: Annotated[float, Range(*LAWS[RUBBER]["log_flow_rate"])] = 0.0
 
 
 class Nuisances(Section):
-    air_drag: Annotated[float, Range(0, 50)] | None = None  # force for mass and speed [1/s]
+    air_drag: Annotated[float, Range(*REACH["air_drag"])] | None = None
 
 
 class RecordedPull(Section):
@@ -74,8 +68,8 @@ class ThetaFile(JsonRecord):
     theta: ThetaValues
     history: RecordedPull | None = None
     nuisances: Nuisances = Nuisances()
-    turn_damping: Annotated[float, Range(0, 1)] = 0.0
-    returned_share: Annotated[float, Range(0.1, 10)] = 1.0
+    turn_damping: Annotated[float, Range(*REACH["turn_damping"])] = 0.0
+    returned_share: Annotated[float, Range(*REACH["returned_share"])] = 1.0
     mounted: bool = True
     loss: dict[Name, float] = {}
     rollouts: Count = 0

@@ -8,12 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from sling2sim2real.identification.posterior.coordinates import (
-    MOST_DRAG,
-    MOST_LOST,
-    TAN_DELTA,
-    Coordinates,
-)
+from sling2sim2real.identification.posterior.coordinates import Coordinates
+from sling2sim2real.parameters import TAN_DELTA
 from sling2sim2real.settings.identification import LAWS, UNSEEN
 from sling2sim2real.simulator.parameters import EXTRA, Parameters
 from tests.identification.objective.pulls import PARAMS, sling_of
@@ -62,8 +58,8 @@ def test_bounds_are_the_boxs_the_methods_and_what_is_possible():
     ends = dict(zip(OURS.names, zip(OURS.low, OURS.high, strict=True), strict=True))
     bounds = PARAMS.methods[METHOD].bounds
     assert all(ends[name] == bounds[name] for name in LAWS["rubber"])
-    assert ends["air_drag"] == (0.0, MOST_DRAG) and ends["turn_damping"] == (0.0, 1.0)
-    assert ends["log_returned_share"] == (-MOST_LOST, MOST_LOST)
+    assert ends["air_drag"] == (0.0, 8.0) and ends["turn_damping"] == (0.0, 1.0)
+    assert ends["log_returned_share"] == (-0.3, 0.3)
     box = PARAMS.parameters
     for corner, side in ((OURS.low, "low"), (OURS.high, "high")):
         values = OURS.parameters(corner[None]).sample()

@@ -82,9 +82,13 @@ def told_of(result) -> dict:
 
 def test_the_truth_is_found_where_no_prior_pulls(exact, monkeypatch):
     """All priors expect the truth, but for the loss factor's."""
-    priors = {name: prior for name, prior in coordinates.PRIORS.items() if name != LOSS}
-    priors |= {name: (TRUE[SPACE.names.index(name)], 0.15) for name in ("softening", "flow")}
-    monkeypatch.setattr(coordinates, "PRIORS", priors)
+    expected, precision = SPACE.expected.copy(), SPACE.precision.copy()
+    precision[SPACE.names.index(LOSS)] = 0.0
+    for name in ("softening", "flow"):
+        axis = SPACE.names.index(name)
+        expected[axis], precision[axis] = TRUE[axis], 0.15**-2
+    centred = replace(SPACE, expected=expected, precision=precision)
+    monkeypatch.setattr(Coordinates, "of_method", lambda *method: centred)
     result = found_of(*exact)
     assert result.fit.settled
     gap = result.fit.phi - TRUE
@@ -93,7 +97,7 @@ def test_the_truth_is_found_where_no_prior_pulls(exact, monkeypatch):
 
 
 def test_the_loss_factors_prior_pulls_towards_it_and_no_farther(first):
-    mean = coordinates.PRIORS[LOSS][0]
+    mean = SPACE.expected[SPACE.names.index(LOSS)]
     assert mean < first.fit.phi[1] < TRUE[1]
     deviation = np.sqrt(np.linalg.inv(first.fit.hessian)[0, 0])
     assert abs(first.fit.phi[0] - TRUE[0]) < 0.4 * deviation

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.optimize import least_squares
 
-from sling2sim2real.identification.posterior.coordinates import STEPS, Coordinates
+from sling2sim2real.identification.posterior.coordinates import Coordinates, shown
 from sling2sim2real.identification.posterior.expansion import Expansion
 from sling2sim2real.identification.posterior.likelihood import Failed
 
 NAMES = "mooney_share", "relaxation", "air_drag"
-SIZE = np.array([STEPS[name] for name in NAMES])
+SIZE = np.array([shown("rubber")[name][1].step for name in NAMES])
 TIME = np.linspace(0, 3, 40)
 
 
@@ -18,7 +18,7 @@ def space(low=(0.0, 0.0, 0.0), high=(50.0, 50.0, 50.0), expected=0.0, spread=np.
     """Three coordinates, bounds and priors in steps of their finite differences."""
     low, high = (SIZE * ends for ends in (low, high))
     precision = np.broadcast_to((spread * SIZE) ** -2.0, 3)
-    return Coordinates("neo_hookean", NAMES, low, high, {}, 1.0, expected * SIZE, precision)
+    return Coordinates("rubber", NAMES, low, high, {}, 1.0, expected * SIZE, precision)
 
 
 def curve(phi: np.ndarray) -> np.ndarray:

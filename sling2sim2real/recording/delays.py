@@ -126,31 +126,33 @@ def correct_delays(pull: Pull, params: Settings) -> tuple[Pull, Delays]:
     Where the pictures of the release are off, the hand is looked for from there on.
     """
     given, off = params.episode.delays, pull.recording.late  # what reading it took off already
-    pull = _put_right(pull, (given.pose or 0.0) - off.get("pose", 0.0))
-    pull = _put_right(pull, camera=(given.camera or 0.0) - off.get("color", 0.0))
+    pull = pull.shifted((given.pose or 0.0) - off.get("pose", 0.0))
+    pull = pull.shifted(camera=(given.camera or 0.0) - off.get("color", 0.0))
     inertia = _or_none(lambda: estimate_tool_inertia(pull, params.setup.tool))
     pose, conflict = _of_pose(pull, inertia, given.pose)
-    pull = _put_right(pull, pose.rest)
+    pull = pull.shifted(pose.rest)
     if inertia is not None:
         left = inertia.delay - pose.rest
         sure = abs(left) > SIGMAS * max(inertia.delay_error, LEAST_ERROR)
         inertia = replace(inertia, delay=left if sure else 0.0)
     camera = Estimate.unseen(given.camera, GIVEN_CAMERA, UNSEEN_CAMERA)
-    by_hand = _by_hand(pull, params.setup.fork_width)
+    release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
+    by_hand = _by_hand(pull, release)
     if by_hand is not None:
         camera = Estimate.seen(*by_hand, against="pose", given=given.camera)
-    pull = _put_right(pull, camera=camera.rest)
-    release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
+    if camera.rest:
+        pull = pull.shifted(camera=camera.rest)
+        release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
     allowed = 0.0 if by_hand is None else SIGMAS * (camera.error or 0.0)
     if pose.alone and release is not None:
         by_itself = _by_itself(pose.rest, by_hand and by_hand[0], camera.rest, release, allowed)
         pose = replace(pose, alone=by_itself is None)
         if by_itself and by_hand is not None:
-            pull = _put_right(pull, -pose.rest, -camera.rest)
+            pull = pull.shifted(-pose.rest, -camera.rest)
             rest = by_hand[0] - pose.rest
             camera = Estimate.seen(rest, by_hand[1], against="pose", given=given.camera)
             pose = Estimate(left=UNSEEN_POSE)
-            pull = _put_right(pull, camera=camera.rest)
+            pull = pull.shifted(camera=camera.rest)
             release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
     if release is not None and release.beyond > allowed:
         if by_hand is not None:
@@ -159,7 +161,7 @@ def correct_delays(pull: Pull, params: Settings) -> tuple[Pull, Delays]:
                 f"the hand in the pictures goes with the pose, but the band is let go {after} after"
                 " the force falls"
             )
-        pull = _put_right(pull, camera=release.middle)
+        pull = pull.shifted(camera=release.middle)
         value, error = (given.camera or 0.0) + camera.rest + release.middle, release.error
         camera = Estimate(value, error, "estimated", True, error, given=given.camera)
     elif release is not None and by_hand is None:
@@ -168,17 +170,15 @@ def correct_delays(pull: Pull, params: Settings) -> tuple[Pull, Delays]:
     return pull, Delays(pose, camera, inertia, release, conflict)
 
 
-def _by_hand(pull: Pull, fork_width: float) -> tuple[float, float] | None:
-    """The camera's delay against the pose and its standard error [s]; None where nothing tells."""
-    release = _or_none(lambda: release_pictures(pull, fork_width))
+def _by_hand(pull: Pull, release: ReleasePictures | None) -> tuple[float, float] | None:
+    """The camera's delay against the pose and its standard error [s]; None where nothing tells.
+
+    Args:
+        release: From which on it is looked for.
+    """
     near = release.middle if release is not None and release.beyond else 0.0
-    matched = _or_none(lambda: camera_delay(_put_right(pull, camera=near)))
+    matched = _or_none(lambda: camera_delay(pull.shifted(camera=near)))
     return (near + matched[0], matched[1]) if matched and matched[1] <= MOST_ERROR else None
-
-
-def _put_right(pull: Pull, pose: float = 0.0, camera: float = 0.0) -> Pull:
-    """The pull itself where nothing is late."""
-    return pull.shifted(pose, camera) if pose or camera else pull
 
 
 def _by_itself(

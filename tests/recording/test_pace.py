@@ -17,7 +17,7 @@ def samples(count: int = 4000, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
 
 
 @given(
-    size=st.integers(2, 40),
+    size=st.one_of(st.integers(2, 40), st.sampled_from([64, 250])),
     width=st.sampled_from([0, 8_000, 60_000]),
     late=st.sampled_from([0, 200_000]),
     lost=st.lists(st.integers(10, 90), max_size=3),

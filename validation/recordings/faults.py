@@ -29,7 +29,7 @@ class Fault:
     Attributes:
         family: Of the classes of public reports.
         unit: Of the sizes, from hardly visible to gross.
-        concerns: Whose checks name it (modules of sling2sim2real/recording/checks).
+        concerns: Whose checks name it (their concern in recording/checks.py).
         make: Does it to a recording.
     """
 

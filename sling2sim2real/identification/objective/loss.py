@@ -21,6 +21,7 @@ from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.signal import cutoff_hz, recording_matrix
 from sling2sim2real.identification.objective.chamfer import Chamfer, CloudDistance
 from sling2sim2real.identification.objective.device_terms import DeviceTerms
+from sling2sim2real.identification.results.evaluations import TERMS
 from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.interaction import Rollouts
 from sling2sim2real.simulator.model import ClampedBand
@@ -28,7 +29,6 @@ from sling2sim2real.simulator.model import ClampedBand
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-TERMS = ("geom", "force", "work")
 FILTER_LOCK = threading.Lock()  # while a filter is made, which takes a second
 
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sling2sim2real.base.parameters import TABLE, Parameter
 from sling2sim2real.identification.posterior.coordinates import DAMPING
-from sling2sim2real.parameters import TABLE, Parameter
 
 HALF_NORMAL_VARIANCE = 1 - 2 / np.pi  # its variance, of a normal's
 EVEN_VARIANCE = 1 / 12  # of a range

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sling2sim2real.base.machine import cores
+from sling2sim2real.base.parameters import TABLE
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.pull import deepest_draw, launch_history
 from sling2sim2real.episode.signal import cutoff_hz
@@ -28,7 +29,6 @@ from sling2sim2real.identification.posterior.likelihood import SIMULATED, Failed
 from sling2sim2real.identification.posterior.residuals import BINS, LEAST_POINTS
 from sling2sim2real.identification.posterior.sampling import SAMPLES, Remaining, samples_of
 from sling2sim2real.identification.results.theta import content_of
-from sling2sim2real.parameters import TABLE
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.simulator.model import ClampedBand, LaunchHistory

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sling2sim2real.parameters import TABLE
+from sling2sim2real.base.parameters import TABLE
 
 QUANTITIES = {row.name: row for row in TABLE}  # in the order of the cards
 

@@ -13,9 +13,9 @@ from __future__ import annotations
 from pipeline.layout import Layout
 from sling2sim2real.base.layout import made
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.evaluations import Evaluations
-from sling2sim2real.identification.objective.session import logging_evaluator
-from sling2sim2real.identification.results.confidence_file import law_entries, save_confidence
+from sling2sim2real.identification.objective.session import law_entries, logging_evaluator
+from sling2sim2real.identification.results.confidence_file import save_confidence
+from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.identification.searches.cma_es import refine
 from sling2sim2real.identification.searches.regions import load_regions
 from sling2sim2real.settings.identification import parameter_names

@@ -18,10 +18,10 @@ from sling2sim2real.base.layout import made
 from sling2sim2real.base.machine import workers
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.density import entries_of, evaluated_mode
-from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.posterior.identify import fit_posterior
 from sling2sim2real.identification.posterior.launches import Evidence, Observed
 from sling2sim2real.identification.results.confidence_file import save_confidence
+from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.identification.results.mounting import sling_of_method
 from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.simulator.model import LaunchSetup

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from pipeline.layout import Layout
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.objective.session import logging_evaluator
-from sling2sim2real.identification.results.confidence_file import law_entries, save_confidence
+from sling2sim2real.identification.objective.session import law_entries, logging_evaluator
+from sling2sim2real.identification.results.confidence_file import save_confidence
 from sling2sim2real.identification.search import explore, rollouts_of
 from stages.start import pair_of_stage, run
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sling2sim2real import parameters
-from sling2sim2real.parameters import PERCENT, Coordinate, Parameter
+from sling2sim2real.base import parameters
+from sling2sim2real.base.parameters import PERCENT, Coordinate, Parameter
 
 NAME = "stiffening"
 ROW = Parameter(

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from sling2sim2real.parameters import TABLE, THETA, Parameter, parameters
+from sling2sim2real.base.parameters import TABLE, THETA, Parameter, parameters
 from sling2sim2real.quantities import QUANTITIES
 from sling2sim2real.settings.identification import LAWS, UNSEEN, ParameterBoxes
 from sling2sim2real.simulator.parameters import EXTRA, names_of

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sling2sim2real.parameters import parameters
+from sling2sim2real.base.parameters import parameters
 from sling2sim2real.quantities import QUANTITIES, rounded
 from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.parameters import EXTRA

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.identification.posterior.identify import Identified, confidence, theta_entries
+from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.model import ClampedBand

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluation
 from sling2sim2real.identification.posterior.identify import Identified, fit_posterior
 from sling2sim2real.identification.posterior.launches import Evidence
+from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.identification.search import explore
 from sling2sim2real.identification.searches.cma_es import refine
 from sling2sim2real.identification.searches.regions import regions_of

@@ -16,9 +16,9 @@ import numpy as np
 
 from sling2sim2real.base.errors import UserError, one_line
 from sling2sim2real.base.imported import imported
-from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.objective.box import SearchBox, latin_hypercube
 from sling2sim2real.identification.objective.evaluate import Evaluation, Penalty
+from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import POSTERIOR
 

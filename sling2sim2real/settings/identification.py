@@ -7,8 +7,8 @@ from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 from pydantic import AfterValidator, create_model, model_validator
 
 from sling2sim2real.base.imported import is_import
+from sling2sim2real.base.parameters import THETA, Parameter, added_by, parameters
 from sling2sim2real.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
-from sling2sim2real.parameters import THETA, Parameter, added_by, parameters
 
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound", bound=float)

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from sling2sim2real.parameters import THETA, parameters
+from sling2sim2real.base.parameters import THETA, parameters
 
 EXTRA = tuple(  # of every law, after its own
     row.name for row in parameters("neo_hookean") if row.name not in THETA

@@ -25,7 +25,7 @@ TARGETS = np.random.default_rng(0).uniform(1.425, 2.425, (1000, 1)).astype(np.fl
 
 @pytest.fixture(scope="module")
 def stored(trained, tmp_path_factory):
-    stored = Stored("toy", "none", tmp_path_factory.mktemp("root"))
+    stored = Stored(tmp_path_factory.mktemp("policy"))
     write_onnx(trained.policy, stored.folder / "policy.onnx")
     return stored
 
@@ -64,7 +64,7 @@ def test_onnx_agrees_with_the_network(trained, stored, folder) -> None:
 
 def test_a_policy_that_sees_the_projectile_agrees_too(seeing, tmp_path) -> None:
     """With positions other than the one it was trained at: the input is one."""
-    stored = Stored("toy", "seeing", tmp_path)
+    stored = Stored(tmp_path / "policy")
     write_onnx(seeing.policy, stored.folder / "policy.onnx")
     write_json(stored.folder / "card.json", written(seeing, FIGURES))
     onnx.checker.check_model(onnx.load(stored.folder / "policy.onnx"), full_check=True)

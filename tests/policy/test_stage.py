@@ -17,7 +17,7 @@ from tests.policy import toy
 from tests.project import DEFAULTS
 
 POINT = (2e5, 0.47, 2e-3, 0.5, 0.6)
-STORED = Stored("band1", "posterior")
+STORED = Stored(Path("data/policies/band1-posterior"))
 FOLDER = STORED.folder
 FILES = {"card.json", "policy.onnx", "training.parquet", "map.parquet"}
 
@@ -30,13 +30,13 @@ def project(tmp_path, monkeypatch):
     content = yaml.load(DEFAULTS)
     content["policy"].update({"envs": 64, "iterations": 12, "map_size": [9, 7]})
     theta = {"band": "band1", "theta": dict(zip(THETA, POINT, strict=True))}
-    write_json(Path("data/theta/band1/posterior.json"), theta)
+    write_json(Path("data/theta/band1-posterior.json"), theta)
 
     def run(launch=toy.launch, **changes) -> None:
         content["policy"].update(changes)
         yaml.dump(content, tmp_path / "params.yaml")
         monkeypatch.setattr(policy, "simulator", lambda *args, **kwargs: launch)
-        monkeypatch.setattr(sys, "argv", ["policy.py", "band1", "posterior"])
+        monkeypatch.setattr(sys, "argv", ["policy.py", "band1-posterior"])
         policy.main()
 
     return run

@@ -13,10 +13,10 @@ import pytest
 
 from pipeline.params import load
 from sling2sim2real.base.layout import NotMade
-from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluation
 from sling2sim2real.identification.objective.loss import TERMS
+from sling2sim2real.identification.results.evaluations import Evaluations
 from stages.start import remedy
 from tests.project import DEFAULTS, ROOT, alive, python, until
 from validation.projects import environment

@@ -10,9 +10,9 @@ from pipeline.params import Params
 from pipeline.report.results import Results
 from pipeline.report.tables.cells import NONE, Table, number, percent
 from pipeline.report.tables.parameters import exactly, printed_loss
+from sling2sim2real.base.parameters import Quantity
 from sling2sim2real.drawing.names import as_code, cell
 from sling2sim2real.drawing.styles import Styles
-from sling2sim2real.parameters import Quantity
 from sling2sim2real.quantities import QUANTITIES, coordinate
 from sling2sim2real.settings.identification import POSTERIOR
 

@@ -10,6 +10,7 @@ import numpy as np
 from sling2sim2real.base.machine import devices, workers
 from sling2sim2real.base.progress import Progress
 from sling2sim2real.episode.episode import Episode
+from sling2sim2real.episode.pull import launch_history
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.engine import simulate_of
 from sling2sim2real.identification.objective.evaluate import Evaluation, Evaluator
@@ -17,6 +18,7 @@ from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.identification.results.mounting import sling_of_method
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import OUR_ENGINE
+from sling2sim2real.simulator.rubber import NEO_HOOKEAN, RUBBER
 
 
 class LoggingEvaluator:
@@ -74,3 +76,9 @@ def evaluator(
         simulate=simulate_of(engine),
         whole=engine != OUR_ENGINE,
     )
+
+
+def law_entries(episode: Episode, law: str) -> dict:
+    """What a θ file says of a law: its name, unless neo-Hookean; with memory, the pull."""
+    named = {} if law == NEO_HOOKEAN else {"law": law}
+    return named | ({"history": launch_history(episode)} if law == RUBBER else {})

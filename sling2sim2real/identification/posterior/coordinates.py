@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import truncnorm
 
-from sling2sim2real.parameters import Coordinate, Parameter, parameters
+from sling2sim2real.base.parameters import Coordinate, Parameter, parameters
 from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters

@@ -11,11 +11,8 @@ from pathlib import Path
 
 from sling2sim2real.base.files import write_json
 from sling2sim2real.base.schema import read_json
-from sling2sim2real.episode.episode import Episode
-from sling2sim2real.episode.pull import launch_history
 from sling2sim2real.identification.results.theta import PosteriorFile
 from sling2sim2real.simulator.parameters import Parameters
-from sling2sim2real.simulator.rubber import NEO_HOOKEAN, RUBBER
 
 
 class ConfidenceFile(PosteriorFile):
@@ -35,9 +32,3 @@ def save_confidence(
 def load_confidence(path: Path) -> dict:
     """The entries of the θ file that such a file holds. Raises NotMade."""
     return read_json(path, ConfidenceFile).estimate
-
-
-def law_entries(episode: Episode, law: str) -> dict:
-    """What a θ file says of a law: its name, unless neo-Hookean; with memory, the pull."""
-    named = {} if law == NEO_HOOKEAN else {"law": law}
-    return named | ({"history": launch_history(episode)} if law == RUBBER else {})

@@ -23,10 +23,10 @@ from pydantic import create_model, model_validator
 
 from sling2sim2real.base.errors import printable
 from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.parameters import TABLE, Parameter
 from sling2sim2real.base.schema import JsonRecord, Name, Range, Section, read_json, refusal
 from sling2sim2real.identification.results.confidence import Confidence, Count
 from sling2sim2real.identification.results.mounting import load_sling
-from sling2sim2real.parameters import TABLE, Parameter
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import LAWS, Law, parameter_names
 from sling2sim2real.simulator.model import ClampedBand, LaunchHistory, LaunchSetup

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.objective.box import SearchBox, reflect
 from sling2sim2real.identification.objective.evaluate import Evaluation
+from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.identification.search import Evaluate, run
 from sling2sim2real.identification.searches.regions import Region
 from sling2sim2real.settings import Settings

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
+from sling2sim2real.base.parameters import TAN_DELTA
 from sling2sim2real.identification.posterior.coordinates import Coordinates
-from sling2sim2real.parameters import TAN_DELTA
 from sling2sim2real.settings.identification import LAWS, UNSEEN
 from sling2sim2real.simulator.parameters import EXTRA, Parameters
 from tests.identification.objective.pulls import PARAMS, sling_of

@@ -20,7 +20,7 @@ DRAW, FURTHER = (-0.30, -0.17), 1.04
 def summary(params):
     """Coordinates, where they stand, and what was known and is with launches from DRAW."""
     rough = with_(params, "sling", **ROUGH)
-    sling = load_sling(rough, "band1", "nowhere", "rubber")
+    sling = load_sling(rough, "band1", None, "rubber")
     setup = LaunchSetup.of(rough.setup, rough.sling, LaunchHistory(1.0, 0.5))
     coordinates = Coordinates.of_method(rough, "posterior", sling)
     phi = coordinates.of(THETA)

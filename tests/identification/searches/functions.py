@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from sling2sim2real.identification.evaluations import Evaluations
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluation
 from sling2sim2real.identification.objective.loss import TERMS
+from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.identification.search import BudgetSpent, bound, function_of, run
 from sling2sim2real.identification.searches.cma_es import cma_es
 from sling2sim2real.identification.searches.regions import Region, find_regions

@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-from sling2sim2real.identification.evaluations import Evaluations
+from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.identification.search import run
 from sling2sim2real.identification.searches.cma_es import cma_es
 from sling2sim2real.identification.searches.regions import Region

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from pipeline.params import Params, load
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.identification.evaluations import Evaluations, theta_content
 from sling2sim2real.identification.objective.box import SearchBox, latin_hypercube
+from sling2sim2real.identification.results.evaluations import Evaluations, theta_content
 from sling2sim2real.identification.search import explore, rollouts_of, run
 from tests.identification.searches import functions
 from tests.identification.searches.functions import (

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -16,10 +18,13 @@ import pyarrow.parquet as pq
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import read_table, replacing
-from sling2sim2real.identification.objective.evaluate import Evaluation
-from sling2sim2real.identification.objective.loss import TERMS
 from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.parameters import Parameters
+
+if TYPE_CHECKING:
+    from sling2sim2real.identification.objective.evaluate import Evaluation
+
+TERMS = ("geom", "force", "work")  # of the paper's loss
 
 
 @dataclass
@@ -59,7 +64,10 @@ class Evaluations:
     def table(self) -> pa.Table:
         if not self._parts:  # the columns of no rows
             points, values = np.zeros((0, len(self.names))), np.zeros(0)
-            nothing = Evaluation(points, points, dict.fromkeys(TERMS, values), values, [])
+            terms = dict.fromkeys(TERMS, values)
+            nothing: Any = SimpleNamespace(
+                unit=points, theta=points, terms=terms, total=values, failure=[]
+            )
             self.add(nothing, phase="", generation=0)
         return pa.concat_tables(self._parts).combine_chunks()
 

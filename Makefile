@@ -7,10 +7,12 @@ help:                 # this list
 
 setup: .venv/ready    # .venv with everything that is needed
 
-demo: setup           # one virtual band from recording to card, as `sling fit` does it
-	@echo "One virtual band: recorded, identified, a policy trained, launched. About three minutes on two cores."
-	@PATH="$(CURDIR)/.venv/bin:$$PATH" sling fit --name band1_dip
-	@echo "Next: source .venv/bin/activate, then sling aim --band band1_dip --target 1.925"
+DEMO = data/raw/band1/dips/band1-dips.mcap
+
+demo: setup           # a virtual band: recorded with dips, then what README's `Your band` does with it
+	@test -f $(DEMO) || .venv/bin/python -m stages.record band1-dips
+	.venv/bin/sling fit $(DEMO) --mass 0.023 --diameter 0.010 --rest-length 0.52 --name mine
+	@echo "Next: source .venv/bin/activate, then sling aim bands/mine --target 1.925"
 
 .venv/ready: pyproject.toml constraints.txt tools/setup.sh
 	@bash tools/setup.sh

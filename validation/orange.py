@@ -16,7 +16,8 @@ ABOUT = {"source": "recording", "mass": 0.0408, "diameter": 0.010, "rest_length"
 
 def with_orange(params: Params) -> Params:
     """params.yaml with that band, whose hand was where its pose says."""
-    return changed(params, {f"bands.{NAME}": ABOUT, "setup.arm_stiffness": None})
+    recorded = {f"bands.{NAME}": ABOUT, f"rig.bands.{NAME}": None}
+    return changed(params, {**recorded, "setup.arm_stiffness": None})
 
 
 def landings(folder: Path) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from sling2sim2real.identification.posterior.residuals import Residuals
 
-UNLIKE = 0.05  # an autocorrelation that is none
+NO_AUTOCORRELATION = 0.05  # an autocorrelation that is none
 
 
 @dataclass(frozen=True)
@@ -193,6 +193,6 @@ def _repeated(left: np.ndarray) -> float:
     if not size:
         return 0.0
     alike = np.correlate(left, left, "full")[len(left) :] / size
-    ends = np.flatnonzero(alike < UNLIKE)
+    ends = np.flatnonzero(alike < NO_AUTOCORRELATION)
     time = 1 + 2 * alike[: ends[0] if len(ends) else len(alike)].sum()
     return float(np.sqrt(size / len(left) * time))

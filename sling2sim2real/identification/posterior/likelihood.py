@@ -29,8 +29,8 @@ from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
 
 SIMULATED = "release", "camera", "hand"
-RELEASE_ERROR = 3e-5  # s: of the release, where the clocks are known by it
-NUDGE = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
+RELEASE_ERROR_S = 3e-5  # s: of the release, where the clocks are known by it
+NUISANCE_STEPS = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Tolerances:
             given["camera"] = np.hypot(given["camera"], given["pose"] or 0.0)
             if clocks["pose"].get("against") == "release":  # and so is the camera's, by the pose
                 given["pose"] = np.hypot(given["pose"] or 0.0, given["release"] or 0.0)
-                given["release"] = RELEASE_ERROR
+                given["release"] = RELEASE_ERROR_S
         return cls(**{name: float(value) for name, value in given.items() if value})
 
     @property
@@ -208,9 +208,9 @@ class Likelihood:
             form: None: that of the rollout there.
         """
         around = parameters_of(phi + np.vstack([0 * steps, np.diag(steps)]))
-        release, _, hand = np.diag(NUDGE)
+        release, _, hand = np.diag(NUISANCE_STEPS)
         jobs = [
-            (around, nuisances, (0.0, NUDGE[1])),
+            (around, nuisances, (0.0, NUISANCE_STEPS[1])),
             (around[:1], nuisances + release),
             (around[:1], nuisances + hand),
         ]
@@ -220,7 +220,7 @@ class Likelihood:
         here, *others = residuals(first)
         moved = np.concatenate([residuals(rollouts) for rollouts in (released, later, led)])
         slopes = (np.array(others) - here) / steps[:, None]
-        nuisance_slopes = (moved - here) / NUDGE[:, None]
+        nuisance_slopes = (moved - here) / NUISANCE_STEPS[:, None]
         form = form or self._form(residuals, here, nuisance_slopes[SIMULATED.index("camera")])
         # The force tells nothing of the loss factor, the recoil does: a law that lacks slow
         # hysteresis would take the one for the other.

@@ -26,8 +26,8 @@ from sling2sim2real.simulator.replay import recorded_force
 BINS = 16  # along the band, equal at rest
 LEAST_POINTS = 4  # of a bin
 MOST_POINTS = 320  # of a picture that are looked at
-WINDOW = 4  # edges on each side of a bin's own on which its point's foot may lie
-VISIBLE = 2 / np.pi  # mean of cos over the half of a tube that faces the camera
+EDGES_BESIDE = 4  # edges on each side of a bin's own on which its point's foot may lie
+MEAN_VISIBLE_COSINE = 2 / np.pi  # mean of cos over the half of a tube that faces the camera
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class Residuals:
             tangent = step / length[:, None]
             radius = self.sling.radius * np.sqrt(self._edges / length)
             front = _across(episode.camera - foot, tangent[edge])
-            offset = points - foot - VISIBLE * radius[edge, None] * front
+            offset = points - foot - MEAN_VISIBLE_COSINE * radius[edge, None] * front
             foot_of_mean, edge_of_mean, _ = nearest(mean, line)
             along = tangent[edge_of_mean]
             depth = _across(episode.camera - mean, along)
@@ -156,7 +156,7 @@ class Residuals:
             np.concatenate(column) for column in columns
         )
         self._bias = np.stack([_dot(bias, self.depth), _dot(bias, self.side)])  # (2, M)
-        window = edge[:, None] + np.arange(-WINDOW, WINDOW + 1)
+        window = edge[:, None] + np.arange(-EDGES_BESIDE, EDGES_BESIDE + 1)
         self._window = np.clip(window, 0, len(self._edges) - 1)
 
     def __call__(self, rollouts: Rollouts) -> np.ndarray:

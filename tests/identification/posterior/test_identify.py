@@ -10,7 +10,7 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.signal import cutoff_hz
 from sling2sim2real.identification.posterior import coordinates, identify
 from sling2sim2real.identification.posterior.coordinates import Coordinates
-from sling2sim2real.identification.posterior.fit import STILL
+from sling2sim2real.identification.posterior.fit import SETTLED_SIZE
 from sling2sim2real.identification.posterior.launches import LaunchLikelihood, Observed
 from sling2sim2real.identification.posterior.likelihood import Likelihood
 from sling2sim2real.identification.posterior.residuals import Residuals, Rule
@@ -92,7 +92,7 @@ def test_the_truth_is_found_where_no_prior_pulls(exact, monkeypatch):
     result = found_of(*exact)
     assert result.fit.settled
     gap = result.fit.phi - TRUE
-    assert np.sqrt(gap @ result.fit.hessian @ gap) < 4 * STILL  # of standard deviations
+    assert np.sqrt(gap @ result.fit.hessian @ gap) < 4 * SETTLED_SIZE  # of standard deviations
     assert abs(gap[0]) < 4e-3 and abs(gap[1]) < 0.15
 
 

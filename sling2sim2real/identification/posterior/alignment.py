@@ -40,7 +40,7 @@ def recoil_seen(
         return None
     since = episode.cloud_time - episode.release_time
     hand = episode.position[episode.time <= episode.release_time][-1:]
-    drawn = LEAST_SHARE_OF_DRAW * Rule.behind(hand)
+    drawn = LEAST_SHARE_OF_DRAW * Rule.behind_fork(hand)
     near = [
         k
         for k in np.flatnonzero(np.abs(since) < RECOIL_WINDOW_S)
@@ -72,9 +72,9 @@ def recoil_seen(
     return float(shifts[best])
 
 
-def shows(cloud: np.ndarray, way: float) -> bool:
+def shows(cloud: np.ndarray, distance: float) -> bool:
     """Whether a cloud (P, 3) shows the band, and so far behind the fork [m]."""
-    return len(cloud) > LEAST_POINTS_SEEN and Rule.behind(cloud) > way
+    return len(cloud) > LEAST_POINTS_SEEN and Rule.behind_fork(cloud) > distance
 
 
 def _off(points: np.ndarray, line: np.ndarray) -> float:

@@ -133,7 +133,7 @@ def fit_posterior(
     if any(
         getattr(wide.tolerances, what) > WORTH_WIDENING * getattr(recording.tolerances, what)
         for recording, wide in zip(recordings, follows, strict=True)
-        for what in ("force", "way")
+        for what in ("force", "recoil")
     ):
         recordings, first = follows, fitted
         fitted = fit(recordings, coordinates, first.phi, **options)

@@ -5,7 +5,7 @@ from .api.exporting import Exported as Exported
 from .api.exporting import export as export
 from .api.identification import Identification as Identification
 from .api.identification import Interval as Interval
-from .api.identification import identify as identify
+from .api.identify import identify as identify
 from .api.launching import Aim as Aim
 from .api.launching import Launch as Launch
 from .api.launching import aim as aim

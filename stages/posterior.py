@@ -13,6 +13,7 @@ from pathlib import Path
 
 from pipeline.layout import Layout
 from pipeline.params import Params
+from sling2sim2real.base.launches_file import FIT, read_launches
 from sling2sim2real.base.layout import made
 from sling2sim2real.base.machine import workers
 from sling2sim2real.episode.episode import Episode
@@ -22,7 +23,6 @@ from sling2sim2real.identification.posterior.launches import Evidence, Observed
 from sling2sim2real.identification.results.confidence_file import save_confidence
 from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.identification.results.mounting import sling_of_method
-from sling2sim2real.launching.launches_file import FIT, read_launches
 from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.simulator.model import LaunchSetup
 from stages.start import pair_of_stage, run

@@ -30,18 +30,6 @@ def main() -> None:
     content = theta_content(evaluations, band, entries)
     write_json(layout.theta(pair), content)
     print(f"{pair.key}: loss {content['loss']['total']:.5g}")
-    intervals = (content["confidence"] or {}).get("parameters", {})
-    for name, value in content["theta"].items():
-        print(f"  {name} {value:.4g}{_interval(intervals.get(name))}")
-
-
-def _interval(interval: dict | None) -> str:
-    if interval is None:
-        return ""
-    if interval.get("fixed"):
-        return " (fixed)"
-    word = "" if interval["identifiable"] else ", not identifiable"
-    return f" ({interval['low']:.4g} to {interval['high']:.4g}{word})"
 
 
 if __name__ == "__main__":

@@ -17,9 +17,9 @@ import numpy as np
 from pipeline.layout import Layout
 from pipeline.params import load
 from rig.physics.launch import Trial, launch
+from sling2sim2real.base.launches_file import read_launches
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.theta import load_samples, load_theta, parameters_of
-from sling2sim2real.launching.launches_file import read_launches
 from sling2sim2real.launching.surface.simulator import simulator
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials import trials

@@ -95,7 +95,7 @@ def test_the_glossary_has_each_label_of_a_card() -> None:
     for quantity in QUANTITIES.values():
         row = re.compile(rf"\| {re.escape(quantity.label)}( \S+)? \|")
         assert any(map(row.match, rows)), quantity.label
-    assert (ROOT / "reports/bands/band1" / GLOSSARY).resolve() == ROOT / "docs/glossary.md"
+    assert (ROOT / "reports/bands/band1/card" / GLOSSARY).resolve() == ROOT / "docs/glossary.md"
 
 
 def test_every_page_is_in_the_index() -> None:

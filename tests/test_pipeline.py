@@ -18,7 +18,7 @@ from ruamel.yaml import YAML
 
 from pipeline.flow.dvc import graph_of
 from rig.physics import compiled
-from sling2sim2real.launching.launches_file import write_launches
+from sling2sim2real.base.launches_file import write_launches
 from tests.project import BAND, ROOT, contents, until
 from tools.closure import stages
 from validation.projects import TINY, MarkedRun, ProjectCopy, copy_project, run_of

@@ -12,12 +12,12 @@ import tempfile
 from importlib.metadata import version
 from pathlib import Path
 
+from pipeline.band_folder import identified
+from pipeline.layout import Layout
 from pipeline.params import load
 from sling2sim2real.api.exporting import export
-from sling2sim2real.api.identification import Identification
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.layout import Layout
 from sling2sim2real.base.machine import devices
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.exporting.card import ASKED
@@ -42,7 +42,7 @@ def main() -> None:
     target, (packages, arguments) = args.to, TARGETS[args.to]
     device = {"mjcf": "cpu", "newton": devices()[0], "usd": "cuda:0"}[target]
     name = f"{target}-gpu" if target == "newton" and device != "cpu" else target
-    path, bands = Path(REPORT.format(name)), args.bands or list(load().run.bands)
+    path, bands = Path(REPORT.format(name)), args.bands or list(load().run.first)
     versions = {name: version(name) for name in packages}
     for band in bands:
         card = exported(target, band)
@@ -59,8 +59,9 @@ def main() -> None:
 def exported(target: str, band: str) -> dict:
     """The card of a band that is exported and replayed. Raises UserError."""
     with tempfile.TemporaryDirectory() as folder:
-        model = Identification.of_run(band, load().run.methods[0])
-        episode = Episode.load_all(Layout().episodes(band))[0]
+        run = load().run
+        pair = run.pairs[f"{run.first[band].key}-{run.main}"]
+        model, episode = identified(pair), Episode.load(Layout().episode(pair))
         card = export(model, target, folder, episode=episode).card
     if "met" not in card:
         raise UserError(f"{target}: its engine or a GPU is missing; nothing was launched there")

@@ -12,12 +12,12 @@ import pandas as pd
 from pipeline.layout import Layout
 from pipeline.params import Params
 from pipeline.params.run import Pair
+from sling2sim2real.base.launches_file import CHECK, read_launches
 from sling2sim2real.base.layout import NotMade, made
 from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.theta import load_theta
 from sling2sim2real.identification.searches.regions import Region, load_regions
-from sling2sim2real.launching.launches_file import CHECK, read_launches
 from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.launching.surface.stored import Stored
 

@@ -6,6 +6,8 @@ import numpy as np
 
 from sling2sim2real.base.errors import UserError
 
+USUAL = {"diameter": 0.010, "rest_length": 0.52}  # m, of a band that nobody has measured
+
 
 def number(name: str, value: object, low: float, high: float, unit: str = "m") -> float:
     """A finite number in a closed range. Raises UserError."""

@@ -10,11 +10,16 @@ import sys
 from collections.abc import Callable
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # a disk that takes no more
+REFUSED = 3  # exit status
 DENIED = (errno.EACCES, errno.EPERM, errno.EROFS)  # a file that is another user's, a fixed disk
 
 
 class UserError(Exception):
     """Bad input. The message says what is wrong, where, and how to mend it, in one line."""
+
+
+class Refused(UserError):
+    """There is an answer, but nobody should act on it: a robot may listen. Exit status REFUSED."""
 
 
 def one_line(message: object) -> str:
@@ -58,7 +63,7 @@ def _whose(path: str) -> str:
 
 # What extras of pyproject.toml bring, as it is imported.
 EXTRAS = {
-    "run": "botorch dvc fastapi gpytorch markdown_it networkx numba onnx onnxscript prefect psutil"
+    "run": "botorch dvc fastapi gpytorch networkx numba onnx onnxscript prefect psutil"
     " rsl_rl sksundae tensordict torch",
     "cluster": "dask dask_jobqueue distributed",
 }
@@ -89,7 +94,7 @@ def run(main: Callable[[], int | None]) -> None:
         sys.stdout.flush()
     except UserError as error:
         print(f"error: {printable(str(error))}", file=sys.stderr)
-        sys.exit(1)
+        sys.exit(REFUSED if isinstance(error, Refused) else 1)
     except ModuleNotFoundError as error:
         if not (line := absent(error)):
             raise

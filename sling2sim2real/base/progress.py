@@ -12,6 +12,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 BAR = 30  # characters
 LINE = re.compile(r"(?P<title>\S+) (?P<done>\d+)/(?P<total>\d+) (?P<unit>\w+)(?:  (?P<facts>.*))?")
@@ -50,6 +51,14 @@ def parse(line: str) -> Step | None:
         return None
     facts = tuple(match["facts"].split("  ")) if match["facts"] else ()
     return Step(match["title"], int(match["done"]), int(match["total"]), match["unit"], facts)
+
+
+class Advancing(Protocol):
+    """Is told how something long gets on."""
+
+    def advance(self, count: int, *facts: str) -> None:
+        """Tell of `count` more units, and `facts` of them."""
+        ...
 
 
 class Progress:

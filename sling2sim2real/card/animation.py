@@ -51,7 +51,7 @@ def save(path: Path, frames: list[Frame], quality: int) -> None:
     with replacing(path) as temporary:
         images[0].save(
             temporary, format="webp", save_all=True, append_images=images[1:], loop=0,
-            duration=list(shown), quality=quality, method=4,
+            duration=list(shown), quality=quality, method=2,
         )  # fmt: skip
 
 

@@ -31,14 +31,13 @@ class Conclusion:
         Args:
             force: Of the first pull, simulated, at its samples [N], shape (T, 3).
         """
-        known, aims, samples = findings(inputs, force), inputs.aims, inputs.samples
+        known, aims, samples = findings(inputs, force), inputs.aims, inputs.found.sampled
         verdict, against = judge(known)
         model, spread = None, aims.spread
         if samples is not None and spread.chosen is not None:
             landings = spread.chosen, spread.centres, spread.slope, aims.half_width
             model = LandingModel.of(samples.names, samples.values, *landings)
         steps = next_steps(
-            inputs.band,
             against,
             model,
             aims.target,

@@ -163,7 +163,7 @@ def landings(inputs: CardInputs) -> Figure:
     ax.axhline(0, color="0.6", lw=0.8, zorder=0)
     ax.set(xlabel="predicted landing [m]", ylabel="landing − predicted [cm]")
     question = "Do launches land inside the predicted intervals?"
-    alone = "Where launches should land: predictions of the simulator; nothing was measured"
+    alone = "Where should launches land?\nPredicted by the simulator; nothing was measured"
     figure.suptitle(question if len(launched) else alone, **TITLE)
     key(figure, entries.items(), columns=2)
     return figure

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.special import ndtri
 
@@ -13,7 +15,6 @@ from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.phases import NO_UNLOADING, phases_of_hand, unseen
 from sling2sim2real.launching.trials.spread import LEVEL
 from sling2sim2real.quantities import QUANTITIES, rounded
-from sling2sim2real.settings import Settings
 
 OUTSIDE = float(ndtri((1 + LEVEL) / 2))  # standard deviations: beyond the interval
 NEARLY = 0.02  # m below the highest that the hand goes: it no longer lifts
@@ -64,7 +65,7 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
             for target, failure in zip(aims.target, aims.failure, strict=True)
             if failure
         ],
-        converged=inputs.policy["training"]["converged"],
+        converged=inputs.trained is not False,
         miss=float(np.nanmax(miss, initial=0.0)),
         half_width=float(aims.half_width.max()),
         outside=int(((landing < low) | (landing > high)).sum()),
@@ -78,7 +79,7 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
         observed=len(left),
         surprising=sum(abs(z) > OUTSIDE for z in unlikely if z is not None),
         carried=None if force is None else carried(inputs.episode, force),
-        density=_density(inputs.params, inputs.band),
+        density=_density(inputs),
         unloaded=any(
             NO_UNLOADING not in unseen(phases_of_hand(episode)) for episode in inputs.episodes
         ),
@@ -106,13 +107,14 @@ def _known(value: float) -> float:
     return float(value) if np.isfinite(value) else 0.0
 
 
-def _density(params: Settings, band: str) -> float | None:
+def _density(inputs: CardInputs) -> float | None:
     """Density of a band that somebody weighed [kg/m^3]; None for the rig's."""
-    sizes = params.bands[band]
-    return None if sizes.source == "rig" else sizes.density
+    band = inputs.found.band
+    volume = np.pi / 4 * band.diameter**2 * band.rest_length
+    return None if inputs.virtual else float(band.mass / volume)
 
 
-def _cautions(episodes: list[Episode]) -> list[tuple[str, str]]:
+def _cautions(episodes: Sequence[Episode]) -> list[tuple[str, str]]:
     """What of each pull's recording costs accuracy, and what to do about it: sentences."""
     cautions = []
     for episode in episodes:

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
 
-from sling2sim2real.base.layout import made
+from sling2sim2real.api.identification import Identification
+from sling2sim2real.base.launches_file import CHECK, LaunchRow
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.results.theta import load_samples, load_theta, parameters_of
-from sling2sim2real.launching.surface.simulator import simulator
-from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.spread import Spread, landing_spread
 from sling2sim2real.launching.trials.stretch import recorded_stretch, stretch_of
 from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.launch import Launches, limited
 from sling2sim2real.simulator.parameters import Parameters
+
+LAUNCHED = ("kind", "landing_y", "predicted_y", "predicted_low", "predicted_high", "stretch")
 
 
 @dataclass(frozen=True)
@@ -51,59 +49,49 @@ class Aims:
 
 
 @dataclass(frozen=True)
-class CardFiles:
-    """What a card is called, and where its inputs lie.
-
-    Attributes:
-        raw: Folder of the recording's files.
-        episodes: Folder of its episodes.
-        clamps, theta, confidence, trials: Files.
-        policy: Folder of a policy.
-    """
-
-    name: str
-    raw: Path
-    episodes: Path
-    clamps: Path
-    theta: Path
-    confidence: Path
-    policy: Path
-    trials: Path
-
-
-@dataclass(frozen=True)
 class CardInputs:
-    """Inputs of the card of one band by one method.
+    """Inputs of a band's card.
 
     Attributes:
+        found: The identified band.
+        method: By which it was.
         episodes: Of all its pulls; pictures show the first.
-        recordings: Names of the files that they are of.
-        theta: The θ file; `confidence` of it is empty where the method tells none.
-        samples: Of θ; None where the method tells none.
-        policy: Its card, as far as it is read.
-        trials: One row a launch (sling2sim2real/launching/trials/trials.py).
-        recorded_stretch: The largest of all pulls.
+        launched: Launches that landed somewhere, beside what was predicted: columns LAUNCHED.
+        aims: At `trials.targets`.
+        trained: Whether the training of its policy converged; None where it has none.
+        virtual: It is a band of the virtual rig.
+        assumed: Names of sizes that nobody has measured.
     """
 
-    params: Settings
-    band: str
+    found: Identification
     method: str
-    files: CardFiles
-    episodes: list[Episode]
-    theta: dict
-    samples: Parameters | None
-    policy: dict
-    trials: pd.DataFrame
+    episodes: Sequence[Episode]
+    launched: pd.DataFrame
     aims: Aims
-    recorded_stretch: float
+    trained: bool | None = None
+    virtual: bool = False
+    assumed: Sequence[str] = field(default=())
+
+    @property
+    def params(self) -> Settings:
+        return self.found.settings
+
+    @property
+    def band(self) -> str:
+        return self.found.band.name
+
+    @property
+    def theta(self) -> dict:
+        """What a θ file says of the band."""
+        return self.found.content()
+
+    @property
+    def confidence(self) -> dict:
+        return self.found.confidence
 
     @property
     def episode(self) -> Episode:
         return self.episodes[0]
-
-    @property
-    def confidence(self) -> dict:
-        return self.theta.get("confidence") or {}
 
     @property
     def launches(self) -> int:
@@ -112,68 +100,64 @@ class CardInputs:
 
     @property
     def recordings(self) -> list[str]:
-        return list(dict.fromkeys(recorded.metadata["input"]["file"] for recorded in self.episodes))
+        """Names of the files that the episodes are of."""
+        return list(dict.fromkeys(episode.metadata["input"]["file"] for episode in self.episodes))
 
     @property
-    def launched(self) -> pd.DataFrame:
-        """Launches that landed somewhere, measured or virtual, beside what was predicted."""
-        return self.trials.loc[self.trials.landing_y.notna() & self.trials.predicted_y.notna()]
+    def recorded_stretch(self) -> float:
+        """The largest of all pulls."""
+        setup = self.params.setup
+        return recorded_stretch(self.episodes, setup.fork_width, self.found.band.rest_length)
 
 
-def card_inputs(params: Settings, band: str, method: str, files: CardFiles) -> CardInputs:
-    """Read and launch. Raises UserError where an input is missing."""
-    band_params = params.bands[band]
-    theta = load_theta(files.theta, band)
-    samples = load_samples(files.confidence, parameters_of(theta))
-    stored = Stored(files.policy)
-    episodes = Episode.load_all(files.episodes)
-    stretch = partial(
-        stretch_of, fork_width=params.setup.fork_width, rest_length=band_params.rest_length
-    )
-    launcher = simulator(params, band, theta, files.clamps)
-    target = np.array(params.trials.targets, float)
-    return CardInputs(
-        params=params,
-        band=band,
-        method=method,
-        files=files,
-        episodes=episodes,
-        theta=theta,
-        samples=samples,
-        policy=stored.card(),
-        trials=pd.read_parquet(made(files.trials)),
-        aims=aims(launcher, target, stored.draws(target), samples, stretch, params),
-        recorded_stretch=recorded_stretch(
-            episodes, params.setup.fork_width, band_params.rest_length
-        ),
-    )
+def stretches(found: Identification, draws: np.ndarray) -> np.ndarray:
+    """How far draws (N, 2) [m] stretch a band, shape (N,)."""
+    sizes = found.settings.setup.fork_width, found.band.rest_length
+    return stretch_of(np.insert(draws, 0, 0, axis=1), *sizes)
 
 
-def aims(
-    launcher: Callable[..., Launches],
-    target: np.ndarray,
-    draw: np.ndarray,
-    samples: Parameters | None,
-    stretch: Callable[[np.ndarray], np.ndarray],
-    params: Settings,
-) -> Aims:
-    """Launch draws (T, 2) at targets (T,), with the best θ and with samples of it.
+def predicted(
+    found: Identification, draws: np.ndarray, error: float | None = None
+) -> tuple[Launches, Spread]:
+    """Launches of draws (N, 2) [m], limited by the arm, and where else they may land.
 
     Args:
-        launcher: As `landing_spread` takes it.
-        stretch: Of the band held at points (N, 3).
-        params: The whole of params.yaml.
+        error: Standard deviation of the draws along each axis [m]; None: of commanded ones.
     """
-    launches = limited(launcher(draw), params.setup.max_force)
-    spread = landing_spread(launcher, draw, samples, params.trials.actuation_error)
-    interval = np.where(np.isnan(launches.landing_y)[:, None], np.nan, spread.interval)
+    error = found.settings.trials.actuation_error if error is None else error
+
+    def launcher(draws: np.ndarray, parameters: Parameters = found.parameters) -> Launches:
+        return found.launches(draws, parameters.values)
+
+    launches = limited(launcher(draws), found.settings.setup.max_force)
+    return launches, landing_spread(launcher, draws, found.sampled, error)
+
+
+def aims_of(found: Identification, target: np.ndarray, draw: np.ndarray) -> Aims:
+    """Launch draws (T, 2) [m] at targets (T,) [m], with the best θ and with samples of it."""
+    launches, spread = predicted(found, draw)
     return Aims(
         target=target,
         draw=draw,
         landing=launches.landing_y,
-        interval=interval,
+        interval=np.where(np.isnan(launches.landing_y)[:, None], np.nan, spread.interval),
         hold_force=launches.hold_force,
         failure=launches.failure,
-        stretch=stretch(np.insert(draw, 0, 0, axis=1)),
+        stretch=stretches(found, draw),
         spread=spread,
     )
+
+
+def checked(found: Identification, rows: Sequence[LaunchRow]) -> pd.DataFrame:
+    """Measured launches that are to check predictions, beside these: columns LAUNCHED."""
+    tables = []
+    for row in rows:
+        if row.use == CHECK and row.landing is not None:
+            draw = np.array([row.draw])
+            launches, spread = predicted(found, draw, row.error)
+            ends = np.where(np.isnan(launches.landing_y[0]), np.nan, spread.interval[0])
+            cells = "measured", row.landing, launches.landing_y[0], *ends
+            tables.append((*cells, stretches(found, draw)[0]))
+    table = pd.DataFrame(tables, columns=list(LAUNCHED))
+    table = table.astype(dict.fromkeys(LAUNCHED[1:], float))
+    return table.loc[table.predicted_y.notna()]

@@ -38,7 +38,6 @@ class Gain(NamedTuple):
 
 
 def next_steps(
-    band: str,
     reasons: Sequence[Reason],
     model: LandingModel | None,
     targets: np.ndarray,
@@ -65,7 +64,7 @@ def next_steps(
     if model is not None and not mended_first:
         aim = len(targets) // 2
         before = model.half_width[aim]
-        words = {"band": band, "a": "another" if launches else "a"}
+        words = {"a": "another" if launches else "a"}
         words |= {"at": f"at {targets[aim]:g} m", "before": f"±{_cm(before)} cm"}
         gains = _gains(model, aim, episodes, unloaded)
         for gain in sorted(gains, key=lambda gain: gain.width):
@@ -81,7 +80,7 @@ def _gains(
 ) -> Iterator[Gain]:
     single, more = (model.after(model.launched(aim, TAPE, count))[aim] for count in (1, LAUNCHES))
     yield Gain(
-        "Measure {a} launch and tell it with `sling observe --band {band}`: {before} {at} become"
+        "Measure {a} launch and tell it with `sling observe`: {before} {at} become"
         f" {{after}}, with {LAUNCHES} launches ±{_cm(more)} cm.",
         single,
     )

@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
-from sling2sim2real.base.layout import NotMade
-from sling2sim2real.card.inputs import CardFiles
+from sling2sim2real.api.identification import Identification
+from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.posterior.likelihood import opening_time
-from sling2sim2real.identification.results.theta import calibrated, parameters_of
-from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.replay import replay
 
 COARSE, FINE = 1 / 30, 1e-3  # s between states, around the release FINE
@@ -58,19 +56,16 @@ def smooth(place: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     return Akima1DInterpolator(place, nodes, axis=0, method="makima")(along)
 
 
-def simulate(
-    params: Settings, band: str, episode: Episode, theta: dict, files: CardFiles
-) -> Simulated:
-    """Play the pull with a θ file's content, its release and its camera's clock as identified.
+def simulate(found: Identification, episode: Episode) -> Simulated:
+    """Play the pull with a band's θ, its release and its camera's clock as identified.
 
     Raises:
-        NotMade: θ fails in simulation.
+        UserError: θ fails in simulation.
     """
-    sling = calibrated(params, band, theta, files.clamps)
-    derived = (theta.get("confidence") or {}).get("derived", {})
+    sling, derived = found.sling, found.confidence.get("derived", {})
     camera = 0.0
-    if "release_time" in derived:  # as the density has them (identify/posterior/likelihood.py)
-        friction = theta["theta"]["dynamic_friction"]
+    if "release_time" in derived:  # as the density has them (identification/posterior)
+        friction = found.theta.dynamic_friction
         sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
         episode = replace(episode, release_time=derived["release_time"]["value"])
         camera = -derived["camera_delay"]["value"]
@@ -87,9 +82,9 @@ def simulate(
     )
     stamps = stamps[np.append(True, np.diff(stamps) > 1e-6)]
     played = replace(episode, cloud_time=stamps, clouds=[])
-    done = replay(sling, played, parameters_of(theta), params.force)
+    done = replay(sling, played, found.parameters, found.settings.force)
     if failure := done.rollouts.failure[0]:
-        raise NotMade(files.theta, failure)
+        raise UserError(f"{found.band.name}: its recording fails in simulation ({failure})")
     return Simulated(
         release=float(release),
         camera=float(camera),

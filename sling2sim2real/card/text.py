@@ -12,8 +12,7 @@ from sling2sim2real.card.inputs import CardInputs
 from sling2sim2real.card.verdict import CARE, NO, TRUSTED, launches_of
 from sling2sim2real.drawing.names import as_code
 
-# From the card's folder; its page stands alone.
-GLOSSARY = "../../../docs/glossary.md"
+GLOSSARY = "../../../../docs/glossary.md"  # from the card of a run's band; a page stands alone
 SAID = {TRUSTED: "can be trusted", CARE: "use with care", NO: "do not use it"}
 
 
@@ -24,13 +23,14 @@ def card_text(inputs: CardInputs, concluded: Conclusion, *, linked: bool = True)
     tried = sorted(inputs.launched.kind.value_counts().items())
     return filled(
         Path(__file__).with_name("card.md.j2"),
-        band=inputs.files.name,
+        band=inputs.band,
         method=inputs.method,
-        theta_file=inputs.files.theta.as_posix(),
         title=SAID[concluded.verdict],
         reasons=concluded.reasons,
-        rig=inputs.params.bands[inputs.band].source == "rig",
-        linked=linked,
+        rig=inputs.virtual,
+        linked=linked and inputs.virtual,
+        sizes=inputs.found.band,
+        assumed=inputs.assumed,
         glossary=GLOSSARY,
         shown=concluded.values,
         draws=zip(*draws, strict=True),

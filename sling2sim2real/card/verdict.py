@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from scipy.stats import binom, t
 
+from sling2sim2real.api.launching import FEW_SAMPLES, MISS
 from sling2sim2real.base.target import TARGET_AREA
 from sling2sim2real.identification.posterior.likelihood import Tolerances
 from sling2sim2real.launching.trials.spread import LEVEL
@@ -21,13 +22,11 @@ TRUSTED, CARE, NO = "can be trusted", "with care", "no"
 # all: the pictures' expected millimetre stands beside a camera that is known to one or two.
 FORCE, HELD, RECOIL = Tolerances().force, 2 * Tolerances().cloud, 5 * Tolerances().cloud
 NO_FIT = 5.0
-FEW_SAMPLES = 30  # by so many an end of an interval is known to a fifth of its width
 # Recordings of one band differ beyond what each leaves open: intervals are then as much wider.
 DISAGREE = 2.0
 # Of a launch's stretch over the recorded one: within it the law was seen, and shortly beyond.
 FURTHER, MUCH_FURTHER = 1.03, 1.3
 NEAR_LIMIT = 0.9  # of the arm's force: its own control needs some
-MISSES = 0.05  # m that a policy may miss by in its own simulator; `sling aim` refuses beyond
 HALF_AREA = (TARGET_AREA[1] - TARGET_AREA[0]) / 2  # m: an interval as wide is the whole target
 WIDE = 0.3 * HALF_AREA
 # As many launches outside their intervals are bad luck once in twenty. They share what is wrong of
@@ -44,8 +43,8 @@ CARRIED = 1.5
 RUBBER = 900, 1300  # kg/m^3 of solid natural, silicone and latex rubber
 # What is wrong where several of force, hand and recoil are missed.
 SIZES = (
-    "Weigh and measure the band again: mass, diameter and rest length under `bands` in params.yaml"
-    " are the first suspects where force, hand and recoil are missed together."
+    "Weigh and measure the band again: mass, diameter and rest length are the first suspects where"
+    " force, hand and recoil are missed together."
 )
 # A band that softens when it is drawn returns less than its pull shows.
 UNSEEN = (
@@ -211,7 +210,7 @@ def _identified(findings: Findings):
         yield Reason(
             False,
             "This method does not tell how sure its values are.",
-            "Let `run.main` in params.yaml be `posterior`: it tells.",
+            "Take the method `posterior`: it tells.",
         )
     elif not findings.settled:
         yield Reason(
@@ -228,7 +227,7 @@ def _identified(findings: Findings):
         )
     misfits = (
         ("force of the pull", findings.force, FORCE, "N", 1, "Check the force sensor and its frame,"
-         " and the band's mass, diameter and rest length under `bands` in params.yaml."),
+         " and the band's mass, diameter and rest length."),
         ("band in the hand", findings.held, HELD, "mm", 1000, "Check the camera's calibration"
          " and where it stands (`/tf_static`, or `setup.camera_to_fork`)."),
         ("recoil", findings.recoil, RECOIL, "mm", 1000, "Check the camera's clock with `sling"
@@ -269,8 +268,8 @@ def _identified(findings: Findings):
         yield Reason(
             False,
             f"The value of {label} is at the {side}; the true one may lie beyond.",
-            f"Check mass, diameter and rest length of the band, else widen the box of {label} in"
-            " params.yaml.",
+            f"Check mass, diameter and rest length of the band, else widen the box of {label}"
+            " (`settings`).",
         )
 
 
@@ -294,10 +293,10 @@ def _launches(findings: Findings):
             f" {findings.max_force:g} N.",
             "Aim at nearer targets, or raise `setup.max_force` if the arm can hold more.",
         )
-    if findings.miss > MISSES:
+    if findings.miss > MISS:
         yield Reason(
             True,
-            f"The policy misses a target by {100 * findings.miss:.0f} cm in its own simulator.",
+            f"The draw misses a target by {100 * findings.miss:.0f} cm in the simulator.",
             "Widen the box of draws (`setup.draw_y`, `setup.draw_z`), or aim at other targets.",
         )
     elif not findings.converged:

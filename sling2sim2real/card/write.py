@@ -1,4 +1,4 @@
-"""Write reports/bands/<band>/: what is known of one band, for a person and for a program."""
+"""Write a band's card into a folder: what is known of it, for a person and for a program."""
 
 from __future__ import annotations
 
@@ -12,34 +12,39 @@ from sling2sim2real.card import figures
 from sling2sim2real.card.animation import animate
 from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.conclusion import Conclusion
-from sling2sim2real.card.inputs import CardFiles, CardInputs, card_inputs
+from sling2sim2real.card.inputs import CardInputs
 from sling2sim2real.card.simulated import simulate
 from sling2sim2real.card.text import card_text
 from sling2sim2real.card.values import boxes
 from sling2sim2real.drawing.page import page
-from sling2sim2real.settings import Settings
+
+SIZES = "mass", "diameter", "rest_length"  # kg, m, m
 
 
-def write(params: Settings, band: str, method: str, files: CardFiles, card_folder: Path) -> dict:
-    """Write a band's card; return what card.json says. Raises UserError: an input is missing."""
-    inputs = card_inputs(params, band, method, files)
-    episode, setup = inputs.episode, params.setup
-    recording = files.raw / episode.metadata["input"]["file"]
-    pictures = Pictures.of(recording, episode, setup)
-    simulated = simulate(params, band, episode, inputs.theta, files)
+def write(to: Path, inputs: CardInputs, pictures: Pictures, digest: str | None = None) -> dict:
+    """Write a band's card into the folder `to`; return what card.json says.
 
+    Args:
+        pictures: Of the first pull.
+        digest: Of all that it rests on, in a band's folder.
+
+    Raises:
+        UserError: θ fails in simulation.
+    """
+    episode, params = inputs.episode, inputs.params
+    simulated = simulate(inputs.found, episode)
     concluded = Conclusion.of(inputs, simulated.force)
     card = content(inputs, concluded)
-    with replacing_folder(card_folder) as folder:
+    with replacing_folder(to) as folder:
         figures.camera(folder / "camera.webp", episode, simulated, pictures)
         figures.force(folder / "force.png", episode, simulated)
-        figures.values(folder / "values.png", concluded.values, boxes(params, method))
+        figures.values(folder / "values.png", concluded.values, boxes(params, inputs.method))
         figures.landings(folder / "landings.png", inputs)
-        animate(folder / "animation.webp", episode, simulated, pictures, setup.fork_width)
+        animate(folder / "animation.webp", episode, simulated, pictures, params.setup.fork_width)
         write_text(folder / "README.md", card_text(inputs, concluded))
-        write_json(folder / "card.json", card)
         text = card_text(inputs, concluded, linked=False)
-        write_text(folder / "index.html", page(text, folder, f"{files.name}: {concluded.verdict}"))
+        write_text(folder / "index.html", page(text, folder, f"{inputs.band}: {card['verdict']}"))
+        write_json(folder / "card.json", card | ({"digest": digest} if digest else {}))
     return card
 
 
@@ -68,7 +73,8 @@ def content(inputs: CardInputs, concluded: Conclusion) -> dict:
         "values": [asdict(value) for value in concluded.values],
         "draws": draws,
         "next": concluded.steps,
-        "theta_file": inputs.files.theta.as_posix(),
+        "sizes": {name: getattr(inputs.found.band, name) for name in SIZES},
+        "assumed": list(inputs.assumed),
         "recordings": len(inputs.recordings),
         "pulls": len(inputs.episodes),
         "launches": inputs.launches,

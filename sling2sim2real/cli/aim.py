@@ -1,109 +1,101 @@
-"""Aim: the policy's draw for a target, checked by a launch in the calibrated simulator."""
+"""What `sling aim` and `sling launch` say: numbers, the hand's pose for a draw, and warnings.
+
+The projectile sits at the band's middle, between the finger tips: at the tool centre point, whose
+pose the recording tracked. The hand's z points from the draw through the origin, its x along the
+fork (cli/plan/hand.py), so that band, hand and launch lie in one plane: "we align the
+projectile direction (i.e., elevation angle) with the plane formed by the stretched sling".
+"""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import NotRequired, TypedDict, cast
+import math
+import sys
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
-from pipeline.params import Params
-from sling2sim2real.base.layout import Layout
-from sling2sim2real.cli import safety
-from sling2sim2real.cli.launch import interval_90, pull_and_pause
-from sling2sim2real.cli.safety import Hazard
-from sling2sim2real.identification.results.theta import load_samples, load_theta, parameters_of
-from sling2sim2real.launching.surface.landing_map import Launcher
-from sling2sim2real.launching.surface.simulator import simulator
-from sling2sim2real.launching.surface.stored import Stored
-from sling2sim2real.settings import expect_known
+from sling2sim2real.api.identification import Identification
+from sling2sim2real.api.launching import Aim, Hazard, Launch
+from sling2sim2real.cli import arguments as kinds
+from sling2sim2real.cli.plan.hand import along_pull, quaternion
+from sling2sim2real.recording.transforms import Transform
+
+NO_POSE = (
+    "no pose of the hand in the robot's base: no recording says where the fork stands there;"
+    " `sling setup` takes it down"
+)
 
 
-class Answer(TypedDict):
-    """Where to draw; the keys are those of `sling aim --json`.
-
-    The interval holds 90 % of the landings that samples of θ (data/confidence) and an error of
-    `trials.actuation_error` in the drawn position give.
-    Landing and interval are None where the launch fails.
-    """
-
-    draw_y_m: float
-    draw_z_m: float
-    predicted_landing_m: float | None
-    interval_90_m: list[float] | None
-    hold_force_n: float | None
-    max_force_n: float  # the arm's limit
-    pull_and_pause_s: NotRequired[list[float]]  # where the law remembers them
-    warnings: list[Hazard]
+def of_launch(launched: Launch) -> dict[str, Any]:
+    """What `sling launch --json` says."""
+    return {
+        "landing_y_m": kinds.finite(launched.landing),
+        "interval_90_m": _listed(launched.interval_90),
+        "speed_m_s": kinds.finite(launched.speed),
+        "hold_force_n": kinds.finite(launched.hold_force),
+        **_asked(launched),
+        "failure": launched.failure,
+        "warnings": launched.warnings,
+    }
 
 
-def aim(
-    params: Params,
-    band: str,
-    method: str,
-    target: float,
-    root: str | Path = ".",
-    launcher: Launcher | None = None,
-) -> Answer:
-    """Where to draw `band` so that the projectile lands at `target` [m].
-
-    Args:
-        params: The whole of params.yaml.
-        launcher: Simulates draws, shape (N, 2) [m], and with a second argument those of other θ,
-            as `simulator` does; the calibrated simulator by default.
-
-    Raises:
-        UserError: Unknown band or method, or a file that is missing.
-    """
-    expect_known(params, "band", band)
-    expect_known(params, "method", method)
-    layout = Layout(Path(root))
-    file = layout.theta(band, method)
-    content = load_theta(file, band)
-    stored = Stored(band, method, layout.root)
-    draw = stored.draws(np.array([target]))[0]
-    if launcher is None:
-        launcher = simulator(params, band, content, root=root)
-    launched = launcher(draw[None])
-    force, failure = float(launched.hold_force[0]), launched.failure[0]
-    low, high = params.policy.targets
-    warnings = []
-    if not low <= target <= high:
-        what = f"the policy was trained for targets from {low:g} to {high:g} m, not {target:g} m"
-        warnings.append(Hazard("target", what))
-    warnings += safety.of_launch(params, force, failure)
-    landing, interval = None, None
-    if not failure:
-        landing = float(launched.landing_y[0])
-        if abs(landing - target) > safety.MISS:
-            what = f"the simulated landing is {landing - target:+.2f} m off the target"
-            warnings.append(Hazard("miss", what))
-        path = layout.confidence(band, method)
-        samples = load_samples(path, parameters_of(content))
-        interval = interval_90(launcher, draw, samples, params.trials.actuation_error)
-        if interval is None:
-            what = "no interval: too many launches beside the predicted one fail"
-            warnings.append(Hazard("interval", what))
-    warnings += safety.of_draw(params, band, draw, layout.root)
-    warnings += safety.of_confidence(content, file)
-    warnings += safety.of_policy(params, band, method, content, layout.root)
-    warnings += safety.of_mounting(params, band, layout.root)
-    answer = {
-        "draw_y_m": float(draw[0]),
-        "draw_z_m": float(draw[1]),
-        "predicted_landing_m": landing,
-        "interval_90_m": interval,
-        "hold_force_n": force if np.isfinite(force) else None,
-        "max_force_n": params.setup.max_force,
-        **pull_and_pause(params, content),
+def of_aim(aimed: Aim, found: Identification) -> dict[str, Any]:
+    """What `sling aim --json` says; the pose is None, with a warning, where the fork is unknown."""
+    launched, drawn = aimed.launch, np.array([0.0, *aimed.draw])
+    warnings, frame, position, turn = list(aimed.warnings), None, None, None
+    if placed := fork_in_base(found):
+        fork, frame = placed
+        position = [round(float(value), 6) + 0.0 for value in fork.apply(drawn)]
+        turn = quaternion(fork.rotation * along_pull(drawn)).tolist()
+    else:
+        warnings.append(Hazard("pose", NO_POSE))
+    return {
+        "draw_y_m": aimed.draw[0],
+        "draw_z_m": aimed.draw[1],
+        "predicted_landing_m": kinds.finite(launched.landing),
+        "interval_90_m": _listed(launched.interval_90),
+        "hold_force_n": kinds.finite(launched.hold_force),
+        "max_force_n": found.settings.setup.max_force,
+        **_asked(launched),
+        "pitch_rad": math.atan2(-drawn[2], -drawn[1]),
+        "tcp_frame": frame,
+        "tcp_position_m": position,
+        "tcp_quaternion_xyzw": turn,
         "warnings": warnings,
     }
-    return cast(Answer, answer)
 
 
-def why_refused(answer: Answer) -> str | None:
-    """Why no robot should carry an answer out: it misses, fails, or the arm may not hold it."""
-    reasons = {warning.about: warning.what for warning in answer["warnings"]}
-    return next(
-        (reasons[topic] for topic in ("failure", "miss", "force") if topic in reasons), None
-    )
+def fork_in_base(found: Identification) -> tuple[Transform, str] | None:
+    """Frame O to the robot's base, and the base's name; setup.base_to_fork comes first."""
+    given, recorded = found.settings.setup.base_to_fork, found.fork
+    pose = given or (recorded and recorded.pose)
+    if pose is None:
+        return None
+    return Transform.of(pose), (recorded and recorded.frame) or found.settings.plan.frame
+
+
+def shown(answer: dict[str, Any], as_json: bool) -> str:
+    """An answer with its `warnings`, which are printed first: as one JSON object, or as lines."""
+    tell(answer["warnings"])
+    if as_json:
+        warnings = [asdict(hazard) for hazard in answer["warnings"]]
+        return kinds.shown({**answer, "warnings": warnings}, True)
+    return kinds.shown({k: v for k, v in answer.items() if k != "warnings"}, False)
+
+
+def tell(hazards: Iterable[Hazard]) -> None:
+    """Print hazards on stderr, a line each."""
+    for hazard in hazards:
+        print(f"warning: {hazard}", file=sys.stderr)
+
+
+def _asked(launched: Launch) -> dict[str, list[float]]:
+    """What a launch takes for granted of the hand, where the law remembers it."""
+    times = launched.pull_and_pause
+    return {"pull_and_pause_s": list(times)} if times else {}
+
+
+def _listed(interval: tuple[float, float] | None) -> list[float] | None:
+    return None if interval is None else list(interval)

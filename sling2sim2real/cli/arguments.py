@@ -12,9 +12,9 @@ import math
 import re
 from collections.abc import Callable
 
-from sling2sim2real.base import launch_table as table
+from sling2sim2real.base.launches_file import LIMITS
 from sling2sim2real.base.schema import Range
-from sling2sim2real.settings.lab import BandParams
+from sling2sim2real.settings.lab import BandParams, Topics
 
 METRES = {"centimetres": 1e-2, "millimetres": 1e-3}
 KILOGRAMS = {"grams": 1e-3}
@@ -60,8 +60,8 @@ def of_a_band(name: str, unit: str, units: dict[str, float], usual: float) -> Ca
 mass = of_a_band("mass", "kilograms", KILOGRAMS, 0.03)
 diameter = of_a_band("diameter", "metres", METRES, 0.010)
 rest_length = of_a_band("rest_length", "metres", METRES, 0.52)
-target = quantity("metres", 0.1, table.LIMITS[table.LANDING][1], METRES, 2.0)
-landing = quantity("metres", 0.01, table.LIMITS[table.LANDING][1], METRES, 2.0)
+target = quantity("metres", 0.1, LIMITS["landing"][1], METRES, 2.0)
+landing = quantity("metres", 0.01, LIMITS["landing"][1], METRES, 2.0)
 distance = quantity("metres", 0.05, 2.0, METRES, 0.35)  # of a draw from the fork
 draw_error = quantity("metres", 0.0, 0.05, METRES, 0.002)
 rate = quantity("hertz", 1.0, 10_000.0, {}, 100.0)
@@ -138,14 +138,20 @@ force = quantity("newtons", 0.1, 1000.0, {}, 30.0)
 MEASURED = {  # of `sling setup`: type, what stands for a value, help
     "left_tip": (point, "X,Y,Z", "of the fork, in the robot's base, as seen from the hand"),
     "right_tip": (point, "X,Y,Z", "the other one; x to the right, y towards the target"),
-    "fork_width": (width, "M", "between the tips, by a ruler; default setup.fork_width"),
+    "fork_width": (width, "M", "between the tips, by a ruler; default that of lab.yaml"),
     "base_to_camera": (pose, "POSE", "X,Y,Z,QX,QY,QZ,QW of the colour camera's optical frame"),
     "camera_to_fork": (pose, "POSE", "of the fork's frame O in that frame, if measured there"),
     "floor": (coordinate, "M", "height of the floor in the robot's base"),
     "max_force": (force, "N", "that the arm may hold"),
     "draw_y": (span, "LOW,HIGH", "draws that the arm reaches, frame O, such as -0.45,-0.25"),
     "draw_z": (span, "LOW,HIGH", "the same upwards, such as -0.30,-0.10"),
+    "tool": (
+        numbers("KG,X,Y,Z", number, *3 * [coordinate]),
+        "KG,X,Y,Z",
+        "that the sensor carries: mass, and its centre in the sensor's frame",
+    ),
 }
+ROLES = tuple(Topics.model_fields)
 
 
 def shown(content: dict, as_json: bool) -> str:
@@ -167,6 +173,14 @@ def readable(value: object) -> str:
 def finite(value: float) -> float | None:
     """JSON has no NaN: what is not known is null."""
     return float(value) if math.isfinite(value) else None
+
+
+def topic(text: str) -> tuple[str, str]:
+    """A topic by its role, ROLE=TOPIC."""
+    role, equals, name = text.partition("=")
+    if role not in ROLES or not name:
+        raise argparse.ArgumentTypeError(f"must be ROLE=TOPIC, of {', '.join(ROLES)}, got {text!r}")
+    return role, name
 
 
 def address(text: str) -> str:

@@ -8,47 +8,31 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from sling2sim2real.base.layout import Layout
+from sling2sim2real.api.arguments import USUAL
+from sling2sim2real.base.errors import run
+from sling2sim2real.base.launches_file import CHECK, FIT
 from sling2sim2real.cli import arguments as kinds
 from sling2sim2real.cli import checkout
-from sling2sim2real.cli.command_line import (
-    JSON,
-    REFUSED,
-    Done,
-    Refusal,
-    command,
-    execute,
-    flag,
-    parser,
-    say,
-)
-from sling2sim2real.cli.sizes import DIAMETER, REST_LENGTH, assumed
+from sling2sim2real.cli.command_line import JSON, REFUSED, Done, command, execute, flag, parser
 from sling2sim2real.exporting import ENGINES
 
-DEFAULT_METHOD = "posterior"
+if TYPE_CHECKING:
+    from sling2sim2real.api.identification import Identification
+
+ALIASES = {"mujoco": "mjcf", "physx": "usd"}  # engines that people name
 
 
 def main() -> None:
     """Entry point of the console script."""
-    sys.path.insert(0, "")  # for stages/ and pipeline/, while commands still drive DVC
-    try:
-        from stages.start import run
-    except ModuleNotFoundError:
-        from sling2sim2real.base.errors import run
     name, arguments = sys.argv[1:2], sys.argv[2:]
     if name and name[0] in checkout.COMMANDS:
         run(lambda: checkout.run(name[0], arguments))
     run(lambda: execute(parser().parse_args()))
 
 
-BAND = flag("--band", required=True, metavar="NAME", help="band of params.yaml")
-METHOD = flag(
-    "--method",
-    metavar="NAME",
-    default=DEFAULT_METHOD,
-    help=f"of params.yaml; default {DEFAULT_METHOD}",
-)
+BAND = flag("band", type=Path, metavar="BAND", help="folder of a band, such as bands/orange")
 DRAW = flag(
     "--draw",
     type=kinds.draw,
@@ -56,82 +40,65 @@ DRAW = flag(
     metavar="Y,Z",
     help="drawn position in metres, frame O; write it with =, --draw=-0.30,-0.17",
 )
-MASS = {"type": kinds.mass, "metavar": "KG", "help": "mass of the band, in kilograms"}
-THICK = {"type": kinds.diameter, "metavar": "M"}
-THICK["help"] = f"diameter of the band, in metres; default {DIAMETER:g}"
-LONG = {"type": kinds.rest_length, "metavar": "M"}
-LONG["help"] = f"of the band between the clamps, in metres; default {REST_LENGTH:g}"
+SIZES = (
+    flag("--mass", type=kinds.mass, metavar="KG", help="mass of the band, in kilograms"),
+    flag(
+        "--diameter",
+        type=kinds.diameter,
+        metavar="M",
+        help=f"diameter of the band, in metres; default {USUAL['diameter']:g}",
+    ),
+    flag(
+        "--rest-length",
+        type=kinds.rest_length,
+        metavar="M",
+        help=f"of the band between the clamps, in metres; default {USUAL['rest_length']:g}",
+    ),
+)
+
+
+def sizes_of(arguments: argparse.Namespace) -> dict[str, float]:
+    """Those that are given."""
+    given = {name: getattr(arguments, name) for name in ("mass", "diameter", "rest_length")}
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def found_of(arguments: argparse.Namespace) -> Identification:
+    """The band as it was identified."""
+    from sling2sim2real.api.band_folder import BandFolder
+    from sling2sim2real.api.identification import Identification
+
+    return Identification.load(BandFolder.at(arguments.band).path)
 
 
 @command(
-    "identify a band from its recordings, train its policy, write its card",
+    "identify a band from its recordings and launches, write its card; go on after an edit",
     "my.mcap --mass 0.0408 --name orange",
     flag(
-        "recordings",
+        "given",
         type=Path,
         nargs="*",
         metavar="FILE.mcap",
-        help="of one band; or bags' folders",
+        help="recordings of one band, or bags' folders; or the folder of a band, bands/orange",
     ),
-    flag("--mass", **MASS),
     flag("--name", metavar="NAME", help="what to call the band; default: as the first file"),
-    flag("--diameter", **THICK),
-    flag("--rest-length", **LONG),
-    flag("--launches", type=Path, metavar="CSV", help="measured launches to learn from"),
+    *SIZES,
+    flag("--policy", action="store_true", help="train a policy, which `sling aim` then asks"),
     JSON,
 )
 def fit(arguments: argparse.Namespace) -> Done:
-    from sling2sim2real.cli.fit.fit import NewBand, fit
-    from sling2sim2real.cli.fit.screen import shown as screen
+    from sling2sim2real.cli.fit import fit, folder_of, shown
 
-    band = NewBand(arguments.mass, arguments.diameter, arguments.rest_length)
-    card = fit(arguments.recordings, arguments.name, band, arguments.launches)
-    return kinds.shown(card, True) if arguments.json else screen(card)
-
-
-@command(
-    "check recordings and add their band to params.yaml",
-    "orange --recording my.mcap --mass 0.0408",
-    flag("name", help="what to call the band: small letters, digits and _"),
-    flag("--recording", type=Path, required=True, nargs="+", metavar="FILE.mcap"),
-    flag("--mass", required=True, **MASS),
-    flag("--diameter", **THICK),
-    flag("--rest-length", **LONG),
-)
-def add_band(arguments: argparse.Namespace) -> Done:
-    from sling2sim2real.cli.preflight.add_band import add_band
-
-    done = add_band(
-        arguments.name,
-        arguments.recording,
-        mass=arguments.mass,
-        diameter=arguments.diameter,
-        rest_length=arguments.rest_length,
-    )
-    return f"{done}\n`sling fit --name {arguments.name}` identifies it"
-
-
-@command(
-    "check further recordings of a band and add them to it",
-    "--band orange more.mcap",
-    BAND,
-    flag("recordings", type=Path, nargs="+", metavar="FILE.mcap", help="or bags' folders"),
-)
-def add_recording(arguments: argparse.Namespace) -> Done:
-    from sling2sim2real.cli.preflight.recordings import add_recording
-
-    done = add_recording(arguments.band, arguments.recordings)
-    return f"{done}\n`sling fit --name {arguments.band}` identifies it anew"
+    folder, recordings = folder_of(arguments.given, arguments.name)
+    card = fit(folder, recordings, sizes_of(arguments), policy=arguments.policy)
+    return kinds.shown(card, True) if arguments.json else shown(card)
 
 
 @command(
     "say whether a recording can be used, what is missing and what costs accuracy",
     "my.mcap --mass 0.0408 --sheet my.png",
-    flag("recording", type=Path, metavar="FILE.mcap", help="or a bag's folder"),
-    flag("--band", metavar="NAME", help="band of params.yaml, for its mass and sizes"),
-    flag("--mass", **MASS),
-    flag("--diameter", **THICK),
-    flag("--rest-length", **LONG),
+    flag("recording", type=Path, metavar="FILE.mcap", help="or a bag's folder, or a band's"),
+    *SIZES,
     flag("--pull", type=kinds.count, metavar="N", help="which pull; default: the first usable one"),
     flag("--sheet", type=Path, metavar="OUT.png", help="draw six moments, force and coverage"),
     flag("--rrd", type=Path, metavar="OUT.rrd", help="write one timeline for Rerun's viewer"),
@@ -140,62 +107,49 @@ def add_recording(arguments: argparse.Namespace) -> Done:
     JSON,
 )
 def check(arguments: argparse.Namespace) -> Done:
-    from pipeline.params import load
-    from sling2sim2real.cli.preflight.command import check
-    from sling2sim2real.settings import Settings
+    from sling2sim2real.cli.preflight.command import check, check_band
 
     if arguments.frames and not arguments.json:
         arguments.refuse("argument --frames: used with --json alone")
-    in_project = arguments.band or Path("params.yaml").exists()
-    if not in_project:
-        say("no params.yaml in this folder: the settings that come with the package are taken")
-    return check(
-        arguments.recording,
-        load() if in_project else Settings.default(),
-        band=arguments.band,
-        mass=arguments.mass,
-        diameter=arguments.diameter,
-        rest_length=arguments.rest_length,
-        as_json=arguments.json,
-        frames=arguments.frames,
-        sheet=arguments.sheet,
-        rrd=arguments.rrd,
-        pictures=arguments.pictures,
-        pull=arguments.pull,
-    )
+    wanted = {name: getattr(arguments, name) for name in ("sheet", "rrd", "pictures", "pull")}
+    options = wanted | {"as_json": arguments.json, "frames": arguments.frames}
+    from sling2sim2real.api.band_folder import BandFolder
+
+    if folder := BandFolder.find(arguments.recording):
+        return check_band(folder, sizes_of(arguments), **options)
+    return check(arguments.recording, sizes_of(arguments), **options)
 
 
 @command(
-    "write what you measured of your lab into params.yaml: tips, camera, floor, limits",
+    "write what you measured of your lab into bands/lab.yaml: tips, camera, floor, limits",
     "--left-tip=0.7,0.1375,0.42 --right-tip=0.7,-0.1375,0.42 --floor=-0.1",
     *(
         flag(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=help_text)
         for name, (kind, metavar, help_text) in kinds.MEASURED.items()
     ),
+    flag(
+        "--topic",
+        type=kinds.topic,
+        action="append",
+        metavar="ROLE=TOPIC",
+        help=f"where it is not found by type and rate; roles are {', '.join(kinds.ROLES)}",
+    ),
     JSON,
 )
 def setup(arguments: argparse.Namespace) -> Done:
-    """Asks at a terminal where nothing is given."""
     from sling2sim2real.cli import setup
 
-    summary = {name: getattr(arguments, name) for name in kinds.MEASURED}
-    measured = setup.LabMeasures(**summary)
-    if measured.nothing and sys.stdin.isatty():
-        done = setup.set_up(setup.requested(), agreed=setup.confirmed)
-    else:
-        done = setup.set_up(measured)
+    measured = {name: getattr(arguments, name) for name in kinds.MEASURED}
+    done = setup.set_up(setup.LabMeasures(**measured, topics=arguments.topic))
     return kinds.shown(done, True) if arguments.json else setup.shown(done)
 
 
 @command(
     "plan the pull that a robot is to record, and check it against limits",
     "--mass 0.0408 --diameter 0.010 --rest-length 0.52 --recording earlier.mcap",
-    flag("--band", metavar="NAME", help="of params.yaml; or with --mass: a new name"),
-    flag("--mass", **MASS),
-    flag("--diameter", **THICK),
-    flag("--rest-length", **LONG),
+    flag("band", type=Path, nargs="?", metavar="BAND", help="its folder; or sizes of one to come"),
+    *SIZES,
     flag("--draw", type=kinds.draw, metavar="Y,Z", help="in metres, frame O; default plan.draw"),
-    flag("--theta", type=Path, metavar="FILE", help="θ file that tells the force to hold"),
     flag(
         "--recording", type=Path, metavar="FILE.mcap", help="for base and force; default: its own"
     ),
@@ -213,60 +167,54 @@ def setup(arguments: argparse.Namespace) -> Done:
         help="stretch the band to the draw so often first, in the same grasp",
     ),
     flag("--pulls", type=kinds.count, default=1, metavar="N", help="in one recording; default 1"),
-    flag("--out", type=Path, metavar="FOLDER", help="default data/plans/<band>"),
+    flag("--out", type=Path, metavar="FOLDER", help="default plan/, in the band's folder"),
     flag("--rate", type=kinds.rate, default=100.0, metavar="HZ", help="of the CSV; default 100"),
     JSON,
 )
 def plan(arguments: argparse.Namespace) -> Done:
-    from pipeline.params import load
-    from sling2sim2real.cli.plan.plan import plan_recording, with_band
+    from sling2sim2real.cli.plan.plan import known_band, plan_recording
 
-    sizes = arguments.mass, arguments.diameter, arguments.rest_length
-    params, band = with_band(load(), arguments.band, *sizes)
-    if any(sizes) and (taken := assumed(*sizes[1:])):
-        say(f"assumed: {taken}")
+    known = known_band(arguments.band, sizes_of(arguments))
+    recordings = [arguments.recording] if arguments.recording else known.recordings
     plan = plan_recording(
-        params,
-        band,
+        known.settings,
+        known.band,
+        recordings=recordings,
+        found=known.found,
         draw=arguments.draw,
-        theta=arguments.theta,
-        recording=arguments.recording,
         pull=arguments.pull,
         precondition=arguments.precondition,
         pulls=arguments.pulls,
     )
-    files = plan.write(arguments.out or Layout().plans(band), arguments.rate)
+    files = plan.write(arguments.out or Path(arguments.band or ".", "plan"), arguments.rate)
     return plan.to_json(files) if arguments.json else plan.to_text(files)
 
 
 @command(
-    "simulate one launch with identified or hand-written parameters",
-    "--band band1 --draw=-0.30,-0.17",
+    "simulate one launch of an identified band",
+    "bands/orange --draw=-0.30,-0.17",
     BAND,
     DRAW,
-    flag("--method", metavar="NAME", help=f"whose θ; default {DEFAULT_METHOD}"),
-    flag("--theta", type=Path, metavar="FILE", help="a θ file instead, such as of your own"),
+    flag("--theta", type=Path, metavar="FILE", help="a θ file of your own instead of the band's"),
     JSON,
 )
 def launch(arguments: argparse.Namespace) -> Done:
-    from pipeline.params import load
-    from sling2sim2real.cli import launch, safety
-    from sling2sim2real.settings import expect_known
+    from dataclasses import replace
 
-    params, method = load(), arguments.method or DEFAULT_METHOD
-    if arguments.theta and arguments.method:
-        arguments.refuse("give --method or --theta, not both")
-    expect_known(params, "method", method, called="--method")
-    theta = arguments.theta or Layout().theta(arguments.band, method)
-    answer = launch.launch_output(params, arguments.band, theta, arguments.draw)
-    return safety.shown(answer, arguments.json)
+    from sling2sim2real.api.launching import launch
+    from sling2sim2real.api.model import Theta
+    from sling2sim2real.cli import aim
+
+    found = found_of(arguments)
+    if arguments.theta:
+        found = replace(found, theta=Theta.load(arguments.theta), samples=None, confidence={})
+    return aim.shown(aim.of_launch(launch(found, arguments.draw)), arguments.json)
 
 
 @command(
-    "say where to draw for a target, by the trained policy",
-    "--band band1 --target 1.925",
+    "say where to draw for a target",
+    "bands/orange --target 1.925",
     BAND,
-    METHOD,
     flag(
         "--target", type=kinds.target, required=True, metavar="M", help="along the floor, in metres"
     ),
@@ -274,113 +222,78 @@ def launch(arguments: argparse.Namespace) -> Done:
     JSON,
 )
 def aim(arguments: argparse.Namespace) -> Done:
-    from pipeline.params import load
-    from sling2sim2real.cli import safety
-    from sling2sim2real.cli.aim import aim, why_refused
-    from sling2sim2real.cli.pose import posed
+    from sling2sim2real.api.launching import Refused, aim
+    from sling2sim2real.cli import aim as answers
 
-    params, band = load(), arguments.band
-    answer = aim(params, band, arguments.method, arguments.target)
-    if not arguments.force and (why := why_refused(answer)):
-        safety.tell(warning for warning in answer["warnings"] if warning.what != why)
-        refusal = f"no draw for {arguments.target:g} m: {why}; --force answers all the same"
+    found = found_of(arguments)
+    try:
+        aimed = aim(found, arguments.target, anyway=arguments.force)
+    except Refused as refused:
         if not arguments.json:
-            raise Refusal(refusal)
-        summary = {"refused": refusal, "warnings": safety.as_json(answer["warnings"])}
-        return kinds.shown(summary, True), REFUSED
-    return safety.shown(posed(answer, params, band), arguments.json)
+            raise
+        return kinds.shown({"refused": str(refused)}, True), REFUSED
+    return answers.shown(answers.of_aim(aimed, found), arguments.json)
 
 
 @command(
-    "learn from a launch that you measured: identify and train again with it",
-    "--band band1 --draw=-0.30,-0.17 --landing 2.21",
+    "learn from a launch that you measured: the band is fitted again with it",
+    "bands/orange --draw=-0.30,-0.17 --landing 2.21",
     BAND,
-    flag("--draw", **(DRAW[1] | {"required": False})),
-    flag("--landing", type=kinds.landing, metavar="M", help="along the floor, in metres"),
+    DRAW,
     flag(
-        "--draw-error",
+        "--landing",
+        type=kinds.landing,
+        required=True,
+        metavar="M",
+        help="along the floor, in metres",
+    ),
+    flag(
+        "--error",
         type=kinds.draw_error,
         metavar="M",
         help="standard deviation of the draw, in metres; default trials.actuation_error",
     ),
-    METHOD,
+    flag("--check", action="store_true", help="hold it against predictions, learn nothing from it"),
     flag("--again", action="store_true", help="it equals one that is there, and is one more"),
-    flag("--undo", action="store_true", help="take the band's last launch out instead"),
-    flag("--no-run", action="store_true", help="only write the launch down, or take it out"),
     JSON,
 )
 def observe(arguments: argparse.Namespace) -> Done:
-    from pipeline.params import load
-    from sling2sim2real.cli import observe
+    from sling2sim2real.api.band_folder import BandFolder
+    from sling2sim2real.base.launches_file import LaunchRow
+    from sling2sim2real.cli.observe import observe, shown
 
-    of_launch = {"--draw": arguments.draw, "--landing": arguments.landing}
-    if arguments.undo:
-        of_launch |= {"--draw-error": arguments.draw_error, "--again": arguments.again or None}
-        if given := [name for name, value in of_launch.items() if value is not None]:
-            arguments.refuse(f"--undo takes the last launch out, so it takes no {given[0]}")
-    elif missing := [name for name, value in of_launch.items() if value is None]:
-        arguments.refuse(f"the following arguments are required: {', '.join(missing)}")
-    run = not arguments.no_run
-    if arguments.undo:
-        answer = observe.undo(load(), arguments.band, arguments.method, run=run)
-    else:
-        answer = observe.observe(
-            load(),
-            arguments.band,
-            arguments.method,
-            arguments.draw,
-            arguments.landing,
-            error=arguments.draw_error,
-            again=arguments.again,
-            run=run,
-        )
-    return kinds.shown(answer, True) if arguments.json else observe.shown(answer)
+    use = CHECK if arguments.check else FIT
+    row = LaunchRow(arguments.draw, arguments.error, arguments.landing, use)
+    answer = observe(BandFolder.at(arguments.band), row, again=arguments.again)
+    return kinds.shown(answer, True) if arguments.json else shown(answer)
 
 
 @command(
     "write an identified band for another engine, matched to the calibrated simulation",
-    "--band band1 --to mjcf",
+    "bands/orange --to mjcf",
     BAND,
-    METHOD,
     flag(
         "--to",
         required=True,
+        type=lambda name: ALIASES.get(name, name),
         choices=ENGINES,
-        help="MuJoCo's XML, numbers and a loader for Newton, PhysX's USD",
+        help="MuJoCo's XML (or: mujoco), numbers and a loader for Newton, PhysX's USD (or: physx)",
     ),
-    flag("--out", type=Path, metavar="FOLDER", help="default data/exports/<band>/<target>"),
+    flag("--out", type=Path, metavar="FOLDER", help="default exports/<target> in its folder"),
     JSON,
 )
 def export(arguments: argparse.Namespace) -> Done:
-    from pipeline.params import load
-    from sling2sim2real.cli.export import export_of_run, shown
+    from sling2sim2real.api.band_folder import BandFolder
+    from sling2sim2real.api.exporting import export
+    from sling2sim2real.base.disk import expect_writable
+    from sling2sim2real.cli.export import shown
 
-    band, method = arguments.band, arguments.method
-    folder, card = export_of_run(load(), band, method, arguments.to, arguments.out)
-    return kinds.shown(card, True) if arguments.json else shown(folder, card)
-
-
-@command(
-    "take a band of your own out of the project: recordings, results, card",
-    "orange",
-    flag("name", metavar="NAME", help="band of params.yaml that was recorded"),
-    flag("--yes", action="store_true", help="do not ask"),
-)
-def remove_band(arguments: argparse.Namespace) -> Done:
-    from sling2sim2real.cli.remove_band import ask, remove_band
-
-    return remove_band(arguments.name, (lambda lines: True) if arguments.yes else ask)
-
-
-@command(
-    "give values of params.yaml back what the last commit has",
-    "optimizer.k_top",
-    flag("keys", nargs="*", metavar="KEY", help="default: all but your bands, setup and plan"),
-)
-def reset(arguments: argparse.Namespace) -> Done:
-    from sling2sim2real.cli.reset import reset
-
-    return "\n".join(reset(arguments.keys)) or "params.yaml is as committed there: nothing to do"
+    found = found_of(arguments)
+    folder = BandFolder.at(arguments.band)
+    out = arguments.out or folder.path / "exports" / arguments.to
+    expect_writable(out)
+    done = export(found, arguments.to, out, episode=folder.first_episode)
+    return kinds.shown(done.card, True) if arguments.json else shown(done.folder, done.card)
 
 
 if __name__ == "__main__":

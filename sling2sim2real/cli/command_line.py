@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from sling2sim2real import __version__
-from sling2sim2real.base.errors import UserError, printable
+from sling2sim2real.base.errors import REFUSED as REFUSED
+from sling2sim2real.base.errors import printable
 from sling2sim2real.cli import checkout
 
 Done = str | tuple[str, int]  # what to print, and an exit status that is not 0
@@ -25,11 +26,6 @@ EXITS = {
     3: "refused: a draw that misses, fails or takes more force than the arm may hold (`sling aim`)",
     130: "interrupted",
 }
-REFUSED = 3
-
-
-class Refusal(UserError):
-    """A command could answer, but should not: a robot may listen."""
 
 
 @dataclass(frozen=True)
@@ -118,12 +114,8 @@ def execute(arguments: argparse.Namespace) -> int:
 
     Returns its exit status.
     """
-    try:
-        with contextlib.redirect_stdout(sys.stderr):
-            done = arguments.command(arguments)
-    except Refusal as refusal:
-        print(f"error: {printable(str(refusal))}", file=sys.stderr)
-        return REFUSED
+    with contextlib.redirect_stdout(sys.stderr):
+        done = arguments.command(arguments)
     text, status = done if isinstance(done, tuple) else (done, 0)
     print(text)
     return status

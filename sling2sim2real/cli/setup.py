@@ -1,4 +1,4 @@
-"""`sling setup`: what a lab measured of itself, checked against itself, into params.yaml.
+"""`sling setup`: what a lab measured of itself, checked against itself, into bands/lab.yaml.
 
 Tips, camera and floor are measured in the robot's base; `setup:` keeps the fork's frame O in the
 base and in the camera, and its height above the floor. docs/recording.md, Calibration.
@@ -7,22 +7,23 @@ base and in the camera, and its height above the floor. docs/recording.md, Calib
 from __future__ import annotations
 
 import math
-from argparse import ArgumentTypeError
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from pydantic import BaseModel
 from scipy.spatial.transform import Rotation
 
-from pipeline.params import Params, load
+from sling2sim2real.api.band_folder import (
+    BANDS,
+    lab_settings,
+    lab_settings_of,
+    plain,
+    read_yaml,
+    write_yaml,
+)
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.files import write_text
-from sling2sim2real.cli.arguments import MEASURED
-from sling2sim2real.cli.command_line import say
-from sling2sim2real.cli.params_file import edited
 from sling2sim2real.recording.frames import SURE, TOUCH, Loop
 from sling2sim2real.recording.transforms import Transform
 from sling2sim2real.settings.lab import SetupParams
@@ -48,6 +49,8 @@ class LabMeasures:
         floor: Height of the floor in the base [m].
         max_force: That the arm may hold [N].
         draw_y, draw_z: Box of draws that the arm reaches, frame O [m].
+        tool: What the force sensor carries: mass [kg] and its centre in the sensor's frame [m].
+        topics: Of the recordings, by role, where they are not found by type and rate.
     """
 
     left_tip: Numbers | None = None
@@ -59,85 +62,46 @@ class LabMeasures:
     max_force: float | None = None
     draw_y: Numbers | None = None
     draw_z: Numbers | None = None
+    tool: Numbers | None = None
+    topics: tuple[tuple[str, str], ...] | None = None
 
     @property
     def nothing(self) -> bool:
         return all(value is None for value in vars(self).values())
 
 
-QUESTIONS = {
-    "left_tip": "left tip of the fork in the robot's base, as the hand sees it: x,y,z [m]",
-    "right_tip": "right tip: x,y,z [m]",
-    "fork_width": "distance between the tips by a ruler [m]",
-    "base_to_camera": "colour camera's optical frame in the base: x,y,z,qx,qy,qz,qw",
-    "floor": "height of the floor in the base [m]",
-    "max_force": "force that the arm may hold [N]",
-    "draw_y": "draws that it reaches, along the fork's y: low,high [m]",
-    "draw_z": "and along z: low,high [m]",
-}
-
-
-def requested(answer: Callable[[str], str] = input) -> LabMeasures:
-    """What a user says at a terminal; an empty answer leaves what is there.
-
-    Args:
-        answer: Given a question, gives the line that is typed.
-    """
-    answers: dict[str, Any] = {}
-    say("Enter alone leaves what params.yaml has.")
-    for name, question in QUESTIONS.items():
-        while text := answer(f"{question}: ").strip():
-            try:
-                answers[name] = MEASURED[name][0](text)
-                break
-            except ArgumentTypeError as error:
-                say(f"  {error}")
-    return LabMeasures(**answers)
-
-
-def confirmed(message: str, answer: Callable[[str], str] = input) -> bool:
-    """Whether a user wants this written; Enter alone does."""
-    say(message)
-    return answer("write this into params.yaml? [Y/n] ").strip().lower() in ("", "y", "yes")
-
-
-def set_up(
-    measured: LabMeasures,
-    path: Path | str = "params.yaml",
-    agreed: Callable[[str], bool] = lambda message: True,
-) -> dict:
-    """Check what was measured and write it into `setup:`; comments and order stay.
-
-    Args:
-        agreed: Given what changes, in words, says whether to write it.
+def set_up(measured: LabMeasures, path: Path = BANDS / "lab.yaml") -> dict:
+    """Check what was measured and write it into lab.yaml, whose comments may be lost.
 
     Returns:
-        `changed`: by key, `old` and `new`; `checked`: what agrees, in words; `written`.
+        `file`; `changed`: by key, `old` and `new`; `checked`: what agrees, in words.
 
     Raises:
         UserError: It contradicts itself or what is there; nothing is written.
     """
-    path = Path(path)
     if measured.nothing:
         raise UserError(
             "nothing to set up: give what you measured, such as --left-tip=0.7,0.14,0.42"
-            " --right-tip=0.7,-0.14,0.42, or answer at a terminal"
+            " --right-tip=0.7,-0.14,0.42"
         )
-    setup = load(path).setup
+    setup = lab_settings(path).setup
     new, checked = changes_of(measured, setup)
-    old = {key: getattr(setup, key) for key in new}
+    old = {key: plain(_as_plain(getattr(setup, key))) for key in new}
     changed = {
-        key: {"old": _plain(old[key]), "new": _plain(value)}
+        key: {"old": old[key], "new": plain(value)}
         for key, value in new.items()
-        if _plain(old[key]) != _plain(value)
+        if old[key] != plain(value)
     }
-    text = edited(path.read_text(encoding="utf-8"), lambda content: _put(content["setup"], changed))
-    Params.parse(text, str(path))
-    content = {"changed": changed, "checked": checked, "written": False}
-    if changed and agreed(shown({**content, "written": True})):
-        write_text(path, text)
-        content["written"] = True
-    return content
+    content = read_yaml(path) if path.is_file() else {}
+    section = content.get("setup") or {}
+    for key, change in changed.items():
+        both = key == "topics" and isinstance(section.get(key), dict)
+        section[key] = section[key] | change["new"] if both else change["new"]
+    if changed:
+        lab_settings_of(content | {"setup": section}, path)  # refuses what cannot be
+        title = "What all bands of this lab share: settings that differ from the library's"
+        write_yaml(path, content | {"setup": section}, title)
+    return {"file": str(path), "changed": changed, "checked": checked}
 
 
 def shown(content: dict) -> str:
@@ -146,9 +110,7 @@ def shown(content: dict) -> str:
         f"setup.{key}: {_text(change['old'])} -> {_text(change['new'])}"
         for key, change in content["changed"].items()
     ]
-    if lines and not content["written"]:
-        lines.append("nothing was written")
-    lines = lines or ["nothing changes"]
+    lines = [*lines, f"wrote {content['file']}"] if lines else ["nothing changes"]
     return "\n".join([*lines, *(f"  {line}" for line in content["checked"])])
 
 
@@ -159,6 +121,10 @@ def changes_of(measured: LabMeasures, setup: SetupParams) -> tuple[dict[str, Any
     for key in ("fork_width", "max_force", "draw_y", "draw_z"):
         if getattr(measured, key) is not None:
             new[key] = getattr(measured, key)
+    if measured.tool is not None:
+        new["tool"] = {"mass": measured.tool[0], "center": measured.tool[1:]}
+    if measured.topics:
+        new["topics"] = dict(measured.topics)
     width = new.get("fork_width", setup.fork_width)
     fork = None if setup.base_to_fork is None else Transform.of(setup.base_to_fork)
     camera = None if measured.base_to_camera is None else Transform.of(measured.base_to_camera)
@@ -294,20 +260,15 @@ def _pose(transform: Transform) -> Numbers:
     return tuple(round(float(value), DIGITS) + 0.0 for value in transform.pose())
 
 
-def _plain(value: object) -> object:
-    return list(value) if isinstance(value, tuple) else value
+def _as_plain(value: object) -> object:
+    return value.model_dump(exclude_none=True) if isinstance(value, BaseModel) else value
 
 
 def _text(value: object) -> str:
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key}: {_text(part)}' for key, part in value.items())}}}"
     if isinstance(value, list):
-        return f"[{', '.join(f'{number:g}' for number in value)}]"
-    return "null" if value is None else f"{value:g}"
-
-
-def _put(section: CommentedMap, changed: dict[str, dict]) -> None:
-    for key, change in changed.items():
-        value = change["new"]
-        if isinstance(value, list):
-            value = CommentedSeq(value)
-            value.fa.set_flow_style()
-        section[key] = value
+        return f"[{', '.join(map(_text, value))}]"
+    if value is None:
+        return "null"
+    return f"{value:g}" if isinstance(value, float | int) else str(value)

@@ -24,10 +24,10 @@ from sling2sim2real.simulator.interaction import interact
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
 
-ANGLE = (-30.0, 60.0)  # of the clamps, towards the middle of the fork [deg]
-RIGIDITY = (0.1, 20.0)  # relative to a solid round band
-UNITS = {"geom": 0.1, "force": 0.1}  # 1 mm of shape weighs as much as 0.1 N
-POISSON = 0.45  # while the band is slack, any will do
+ANGLES_DEG = (-30.0, 60.0)  # of the clamps, towards the middle of the fork [deg]
+RELATIVE_RIGIDITIES = (0.1, 20.0)  # relative to a solid round band
+TERM_UNITS = {"geom": 0.1, "force": 0.1}  # 1 mm of shape weighs as much as 0.1 N
+SLACK_POISSONS_RATIO = 0.45  # while the band is slack, any will do
 
 
 def slack_part(episode: Episode) -> Episode:
@@ -109,7 +109,9 @@ def calibrate_clamps(
     solid = young * np.pi * sling.radius**4 / 4
     part = slack_part(episode)
     loss = EpisodeLoss.plain(params, part, sling)
-    unit_parameters = Parameters.of(sling.law, np.array([young, POISSON, 5e-3, 1.0, 1.0]))
+    unit_parameters = Parameters.of(
+        sling.law, np.array([young, SLACK_POISSONS_RATIO, 5e-3, 1.0, 1.0])
+    )
     held_fast = replace(sling, grip_force=1e6)
 
     def direction(angle: float) -> np.ndarray:
@@ -123,7 +125,7 @@ def calibrate_clamps(
             trial, part, unit_parameters.spread(len(rigidity)), rigidity=solid * rigidity
         )
         terms = loss.terms(rollouts)
-        total = sum(terms[name] / unit for name, unit in UNITS.items())
+        total = sum(terms[name] / unit for name, unit in TERM_UNITS.items())
         return np.where([reason is None for reason in rollouts.failure], total, np.inf)
 
     def best(angles: np.ndarray, rigidity: np.ndarray) -> tuple[float, float, float]:
@@ -133,7 +135,7 @@ def calibrate_clamps(
         return float(table[i, j]), float(angles[i]), float(rigidity[j])
 
     start = float(losses(0.0, np.array([1.0]))[0])
-    coarse = best(np.linspace(*ANGLE, 10), np.geomspace(*RIGIDITY, 16))
+    coarse = best(np.linspace(*ANGLES_DEG, 10), np.geomspace(*RELATIVE_RIGIDITIES, 16))
     for width in (1.0, 0.3):  # finer around the best: 9 degrees and a factor of 3, then a third
         coarse = min(
             coarse,

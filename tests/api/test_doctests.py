@@ -23,7 +23,7 @@ RESULTS = {
     "Launch",
     "Simulation",
 }  # of functions
-INTERNAL = {"arguments"}  # modules without a public name
+INTERNAL = {"arguments", "band_folder", "identification"}  # modules without a public name
 OTHERS = {"LaunchHistory", "Mounting", "Observed", "UserError"}  # the library's, passed on
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sling2sim2real import Identification, LaunchHistory, Settings, Theta, aim, launch
-from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.errors import Refused, UserError
 from sling2sim2real.launching.surface.stored import Stored
 from tests.policy.linear import write_policy
 
@@ -37,14 +37,22 @@ def test_the_interval_holds_what_samples_say(world, aimed) -> None:
     near = world.theta.point * np.ones((50, 1))
     near[:, 0] *= np.linspace(0.9, 1.1, 50)
     arguments = {name: getattr(world, name) for name in ("band", "theta", "settings")}
-    sure = Identification(**arguments, samples=near[24:26], settled=True)
-    unsure = Identification(**arguments, samples=near, settled=False, stretch=1.2)
+    sure = Identification(**arguments, samples=near[24:26], confidence={"settled": True})
+    unsure = Identification(
+        **arguments, samples=near, confidence={"settled": False}, stretch=1.2, stale=True
+    )
     narrow, wide = (np.ptp(aim(result, 2.0).interval_90) for result in (sure, unsure))
     assert wide > 3 * narrow
     assert aim(sure, 2.0).warnings == ()
-    summary = aim(unsure, 2.0).warnings
-    assert "has not converged" in summary[0] and "its recordings by 20.0 % at most" in summary[1]
-    assert "no samples" in aimed.warnings[0]
+    stretch, confidence, stale = aim(unsure, 2.0).warnings
+    assert "its recordings by 20.0 % at most" in str(stretch)
+    assert "has not converged" in str(confidence) and "have changed since" in str(stale)
+    assert [hazard.about for hazard in aimed.warnings] == ["confidence"]
+    assert "no samples" in str(aimed.warnings[0])
+    few = Identification(
+        **arguments, samples=near, confidence={"settled": True, "effective_samples": 12.0}
+    )
+    assert "rests on 12 samples" in str(aim(few, 2.0).warnings[0])
 
 
 def test_what_the_hand_must_do_is_said(world, aimed) -> None:
@@ -54,11 +62,18 @@ def test_what_the_hand_must_do_is_said(world, aimed) -> None:
 
 
 def test_out_of_reach_is_said_with_what_is_in_reach(world) -> None:
-    with pytest.raises(UserError, match=r"target 19 m: no draw .* they land from \d"):
+    with pytest.raises(UserError, match=r"target 19 m: the draw for it lands .* land from \d"):
         aim(world, 19.0)
     weak = replace(world, settings=Settings.coarse(setup={"max_force": 0.5}))
-    with pytest.raises(UserError, match="none of them lands"):
+    with pytest.raises(UserError, match="no draw lands; none of the box"):
         aim(weak, 2.0)
+
+
+def test_a_launch_has_the_interval_of_its_draw(world) -> None:
+    shot, exact = launch(world, (-0.3, -0.15)), launch(world, (-0.3, -0.15), error=0.0)
+    low, high = shot.interval_90
+    assert low < shot.landing < high
+    assert np.ptp(exact.interval_90) < 1e-3 < high - low
 
 
 def test_a_launch_that_fails_says_why(world) -> None:
@@ -69,28 +84,33 @@ def test_a_launch_that_fails_says_why(world) -> None:
     assert launch(soft, (-0.2, -0.1)).failure
 
 
-def test_a_runs_policy_is_asked_as_the_command_asks_it(world, tmp_path) -> None:
-    """One that draws along a line: the same draw as `sling aim`, whatever else lands there."""
-    policy = Stored("toy", "none", tmp_path)
-    write_policy(policy.folder / "policy.onnx", (-0.05, 0.0), (-0.2, -0.15))
-    put_card(policy.folder, world.theta.content("toy")["theta"])
+def test_the_policy_in_a_bands_folder_is_asked(world, tmp_path) -> None:
+    """One that draws along a line, whatever else lands there."""
+    policy = Stored.of_band(tmp_path)
+    write_policy(policy.network, (-0.05, 0.0), (-0.2, -0.15))
+    put_card(policy.card_file, world.theta.content("toy")["theta"])
     arguments = {name: getattr(world, name) for name in ("band", "theta", "settings")}
-    answer = aim(Identification(**arguments, policy=policy), 2.0)
+    found = Identification(**arguments, policy=policy)
+    answer = aim(found, 2.0, anyway=True)
     np.testing.assert_allclose(answer.draw, policy.draws(np.array([2.0]))[0])
-    assert not any("another θ" in warning for warning in answer.warnings)
-    put_card(policy.folder, {"youngs_modulus": 1.0})
-    summary = aim(Identification(**arguments, policy=policy), 2.0).warnings
-    assert any("another θ" in warning for warning in summary)
+    assert not any("another θ" in str(warning) for warning in answer.warnings)
+    put_card(policy.card_file, {"youngs_modulus": 1.0})
+    summary = aim(found, 2.0, anyway=True).warnings
+    assert any("another θ" in str(warning) for warning in summary)
+    assert abs(answer.launch.landing - 2.0) > 0.05  # which is no answer, but to those who insist
+    with pytest.raises(Refused, match="lands .* off in simulation; draws of the box .* land from"):
+        aim(found, 2.0)
+    assert aim(found, 3.0, anyway=True).warnings[0].about == "target"
 
 
-def put_card(folder, theta: dict) -> None:
+def put_card(file, theta: dict) -> None:
     error = {"draws": 1, "mean_error_m": 0.0, "max_error_m": 0.0}
     card = {
         "training": {"converged": True, "mean_error_m": 0.0, "max_error_m": 0.0},
         "landing_map": {"box": error, "target_range": error},
         "theta": theta,
     }
-    (folder / "card.json").write_text(json.dumps(card))
+    file.write_text(json.dumps(card))
 
 
 @pytest.mark.parametrize("target", ["2", None, float("nan"), -1.0, 195, [2.0]])

@@ -9,7 +9,6 @@ import pytest
 from sling2sim2real import Band, LaunchHistory, Model, Mounting, Settings, Theta
 from sling2sim2real.api.model import with_band
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.layout import Layout
 from sling2sim2real.identification.results.theta import load_theta
 from sling2sim2real.launching.surface.simulator import simulator
 from sling2sim2real.settings.identification import LAWS
@@ -26,11 +25,11 @@ def test_launches_are_those_of_a_run_with_the_same_theta_file(world, tmp_path, s
         history=HISTORY,
         mounting=Mounting(clamp_direction=(0.6, 0.0, -0.8), flexural_rigidity=2e-4),
     )
-    mounting = Layout(tmp_path).clamps("band")
-    mounting.parent.mkdir(parents=True)
+    mounting = tmp_path / "clamps.json"
     mounting.write_text(model.mounting.model_dump_json())
     content = model.theta.content("band", HISTORY)
-    theirs = simulator(with_band(model.settings, model.band), "band", content, root=tmp_path)(DRAWS)
+    settings = with_band(model.settings, model.band)
+    theirs = simulator(settings, "band", content, mounting)(DRAWS)
     ours = model.launches(DRAWS)
     assert np.array_equal(ours.landing_y, theirs.landing_y)
     assert not np.array_equal(world.launches(DRAWS).landing_y, ours.landing_y)

@@ -8,9 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pipeline.band_folder import card_inputs
+from pipeline.layout import Layout
 from pipeline.params import Params, load
-from sling2sim2real.base.layout import Layout
-from sling2sim2real.card.inputs import CardInputs, card_inputs
+from pipeline.params.run import Pair
+from sling2sim2real.card.inputs import CardInputs
 from sling2sim2real.recording.build import build_episodes
 from sling2sim2real.simulator.parameters import EXTRA
 from tests import once
@@ -20,6 +22,7 @@ from validation.projects import ROUGH
 from validation.recordings.bag import Truth, write_bag
 
 BAND, METHOD = "toy", "posterior"
+PAIR = Pair(band=BAND, recording="plain", method=METHOD)
 TRUTH = Truth()
 THETA = {
     "youngs_modulus": 3e5,
@@ -90,22 +93,22 @@ def make(root: Path) -> None:
     episode = {"duration": 3.6, "samples": 120, "tail": 0.5}
     write_params_of(root, BAND, METHOD, 0.03, episode=episode, sling=ROUGH)
     params, layout = load(root / "params.yaml"), Layout(root)
-    layout.raw(BAND).mkdir(parents=True)
-    recording = layout.raw(BAND) / "seen.mcap"
+    layout.raw(PAIR).mkdir(parents=True)
+    recording = layout.raw(PAIR) / "seen.mcap"
     write_bag(recording, TRUTH)
     episode = build_episodes(recording, BAND, params)[0][0]
-    episode.save(layout.episode(BAND))
+    episode.save(layout.episode(PAIR))
     theta = theta_file(BAND)
     posterior = {"names": [*POINT], "samples": samples().tolist()}
     for path, summary in (
-        (layout.theta(BAND, METHOD), theta),
-        (layout.confidence(BAND, METHOD), posterior),
+        (layout.theta(PAIR), theta),
+        (layout.confidence(PAIR), posterior),
     ):
         path.parent.mkdir(parents=True)
         path.write_text(json.dumps(summary))
-    layout.trials(BAND, METHOD).parent.mkdir(parents=True)
-    trials().to_parquet(layout.trials(BAND, METHOD))
-    write_stored(layout.policy(BAND, METHOD))
+    layout.trials(PAIR).parent.mkdir(parents=True)
+    trials().to_parquet(layout.trials(PAIR))
+    write_stored(layout.policy(PAIR))
 
 
 @pytest.fixture(scope="session")
@@ -126,5 +129,5 @@ def card_params(project: Path) -> Params:
 
 
 @pytest.fixture(scope="session")
-def summary(project: Path, card_params: Params) -> CardInputs:
-    return card_inputs(card_params, BAND, METHOD, project)
+def summary(project: Path) -> CardInputs:
+    return card_inputs(PAIR, project)

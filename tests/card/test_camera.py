@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipeline.layout import Layout
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.layout import Layout, NotMade
+from sling2sim2real.base.layout import NotMade
 from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.camera_view import CameraView
 from sling2sim2real.card.simulated import Simulated, simulate
@@ -17,14 +18,14 @@ from sling2sim2real.recording.camera import Camera
 from sling2sim2real.recording.frames import EpisodeGeometry, geometry_of
 from sling2sim2real.recording.streams import read_recording
 from sling2sim2real.recording.transforms import Transform
-from tests.card.conftest import BAND, METHOD, TRUTH
+from tests.card.conftest import BAND, PAIR, TRUTH
 from tests.recording.parts import split
 
 
 @pytest.fixture(scope="module")
 def pictures(summary, project) -> Pictures:
     return Pictures.of(
-        Layout(project).raw(BAND) / "seen.mcap", summary.episode, summary.params.setup
+        Layout(project).raw(PAIR) / "seen.mcap", summary.episode, summary.params.setup
     )
 
 
@@ -77,11 +78,25 @@ def test_a_lens_and_a_pose_are_those_of_opencv() -> None:
 
 
 def test_the_parts_of_a_split_bag_are_one_recording(pictures, summary, project, tmp_path) -> None:
-    split(Layout(project).raw(BAND) / "seen.mcap", tmp_path / "seen", cuts=(1.5,))
+    split(Layout(project).raw(PAIR) / "seen.mcap", tmp_path / "seen", cuts=(1.5,))
     parts = Pictures.of(tmp_path / "seen", summary.episode, summary.params.setup)
     np.testing.assert_array_equal(parts.time, pictures.time)
     for number in (0, len(parts.time) - 1):
         np.testing.assert_array_equal(parts[number], pictures[number])
+
+
+def test_what_a_card_shows_is_kept_as_it_is(pictures, summary, tmp_path) -> None:
+    """And what is looked up by time is found alike."""
+    few = pictures.around(summary.episode)
+    few.save(tmp_path / "pictures")
+    again = Pictures.load(tmp_path / "pictures", summary.episode)
+    assert len(again.time) < len(pictures.time)
+    moments = np.append(TRUTH.release + np.arange(-0.25, 0.35, 0.01), TRUTH.grasp - 0.1)
+    for moment in moments:
+        before, after = (seen.latest(moment) for seen in (pictures, again))
+        assert pictures.time[before] == again.time[after]
+        np.testing.assert_array_equal(pictures[before], again[after])
+    assert again.camera.width == pictures.camera.width
 
 
 def test_a_missing_recording_is_named(summary, tmp_path) -> None:
@@ -89,8 +104,8 @@ def test_a_missing_recording_is_named(summary, tmp_path) -> None:
         Pictures.of(tmp_path / "none.mcap", summary.episode, summary.params.setup)
 
 
-def test_a_simulated_pull_holds_the_hand_and_its_states_are_smooth(summary, card_params) -> None:
-    simulated = simulate(card_params, BAND, METHOD, summary.episode, summary.theta)
+def test_a_simulated_pull_holds_the_hand_and_its_states_are_smooth(summary) -> None:
+    simulated = simulate(summary.found, summary.episode)
     assert simulated.release == TRUTH.release
     middle = simulated.line(TRUTH.release - 0.05)[60]
     np.testing.assert_allclose(middle, TRUTH.hand(TRUTH.release - 0.05), atol=5e-3)
@@ -105,7 +120,7 @@ def test_a_simulated_pull_holds_the_hand_and_its_states_are_smooth(summary, card
 
 def test_a_colour_camera_beside_the_depth_camera(summary, project) -> None:
     """What lies before the depth camera is seen where the colour camera's own frame has it."""
-    path, setup = Layout(project).raw(BAND) / "seen.mcap", summary.params.setup
+    path, setup = Layout(project).raw(PAIR) / "seen.mcap", summary.params.setup
     recording = read_recording(path, setup)
     geometry = geometry_of(recording, setup)
     beside = Transform(Rotation.from_rotvec([0.02, -0.05, 0.01]), np.array([0.06, 0.01, -0.02]))
@@ -119,7 +134,7 @@ def test_a_colour_camera_beside_the_depth_camera(summary, project) -> None:
 
 
 def test_an_episode_of_an_older_version_is_named_with_its_remedy(summary, project) -> None:
-    path = Layout(project).raw(BAND) / "seen.mcap"
+    path = Layout(project).raw(PAIR) / "seen.mcap"
     old = {key: value for key, value in summary.episode.metadata.items() if key != "geometry"}
     with pytest.raises(UserError, match=f"of {BAND} are of an older version.*dvc repro"):
         Pictures.of(path, replace(summary.episode, metadata=old), summary.params.setup)

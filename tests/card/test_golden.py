@@ -40,17 +40,15 @@ def inputs(summary) -> CardInputs:
     """A band of the rig with a caution, a value that the recording does not tell, and evidence."""
     caution = {"about": "gap", "what": "the pose has a gap of 0.1 s", "cure": "record it again"}
     metadata = summary.episode.metadata | {"cautions": [caution]}
-    theta, params = deepcopy(summary.theta), summary.params
-    known = theta["confidence"]
+    known = deepcopy(summary.confidence)
     known["parameters"]["mooney_share"] |= {"prior": [-0.24, 0.84], "identifiable": False}
     known["launches"] = [{"draw": [-0.3, -0.2], "landing": 1.9, "left": 0.01, "z_without_it": 0.5}]
-    rig = params.bands[summary.band].model_copy(update={"source": "rig"})
     return replace(
         summary,
-        params=params.model_copy(update={"bands": {summary.band: rig}}),
+        found=replace(summary.found, confidence=known),
         episodes=[replace(summary.episode, metadata=metadata)],
-        theta=theta,
         aims=AIMS,
+        virtual=True,
     )
 
 
@@ -79,7 +77,7 @@ def test_a_launch_that_fails_has_no_landing(inputs) -> None:
 
 
 def test_without_a_density_it_tells_less(inputs) -> None:
-    plain = replace(inputs, theta=inputs.theta | {"confidence": None}, samples=None)
+    plain = replace(inputs, found=replace(inputs.found, confidence={}, samples=None))
     card = content(plain, concluded(plain))
     assert card["verdict"] != "can be trusted"
     assert any("does not tell how sure" in reason for reason in card["reasons"])

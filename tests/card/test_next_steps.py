@@ -29,12 +29,12 @@ def test_a_force_that_still_falls_is_seen() -> None:
 def test_steps_are_cures_and_then_gains_the_largest_first() -> None:
     model = landing_model()
     reasons = [Reason(False, "why", "Do this."), Reason(False, "too", "Do this.")]
-    steps = next_steps("toy", reasons, model, np.array([1.7, 1.9]), [still(0.0)])
+    steps = next_steps(reasons, model, np.array([1.7, 1.9]), [still(0.0)])
     assert steps[0] == "Do this." and steps.count("Do this.") == 1
     after = [float(step.split("±")[2].split()[0]) for step in steps[1:]]
     assert len(after) >= 2 and after == sorted(after)
-    assert "Measure a launch and tell it with `sling observe --band toy`" in " ".join(steps)
-    more = next_steps("toy", reasons, model, np.array([1.7, 1.9]), [still(0.0)], launches=2)
+    assert "Measure a launch and tell it with `sling observe`" in " ".join(steps)
+    more = next_steps(reasons, model, np.array([1.7, 1.9]), [still(0.0)], launches=2)
     assert "Measure another launch" in " ".join(more)
     assert "1.9 m" in steps[1]
 
@@ -42,22 +42,20 @@ def test_steps_are_cures_and_then_gains_the_largest_first() -> None:
 def test_a_dip_is_recommended_where_no_pull_unloads() -> None:
     """With its gain where softening is a coordinate, and without where it is fixed."""
     model, targets, pulls = landing_model(), np.array([1.7, 1.9]), [still(0.0)]
-    fixed = next_steps("toy", [], model, targets, pulls, unloaded=False)
+    fixed = next_steps([], model, targets, pulls, unloaded=False)
     assert fixed[0] == (
         "Record a pull with dips (`sling plan` writes it): it shows how the band unloads, which a"
         " launch depends on."
     )
-    assert "dip" not in " ".join(next_steps("toy", [], model, targets, pulls))
-    assert "dip" not in " ".join(next_steps("toy", [], model, targets, pulls, 1, unloaded=False))
+    assert "dip" not in " ".join(next_steps([], model, targets, pulls))
+    assert "dip" not in " ".join(next_steps([], model, targets, pulls, 1, unloaded=False))
     names = [*NAMES, "softening"]
     covariance, gradient = np.eye(5) * 0.1**2, np.column_stack([GRADIENT, [-2.0, -2.2]])
     covariance[:4, :4] = model.covariance
     spread = np.sqrt(np.einsum("td,de,te->t", gradient, covariance, gradient) + model.draw**2)
     free = LandingModel(names, covariance, gradient, model.draw, 1.645 * spread)
     (explained,) = [
-        step
-        for step in next_steps("toy", [], free, targets, pulls, unloaded=False)
-        if "dip" in step
+        step for step in next_steps([], free, targets, pulls, unloaded=False) if "dip" in step
     ]
     less = free.after(free.exact(["softening"]))[1]
     after = float(explained.split("±")[2].split()[0]) / 100
@@ -68,15 +66,15 @@ def test_a_dip_is_recommended_where_no_pull_unloads() -> None:
 def test_what_speaks_against_any_use_is_mended_first() -> None:
     model = landing_model()
     reasons = [Reason(True, "why", "Do this."), Reason(False, "too", "And that.")]
-    requested = "toy", reasons, model, np.array([1.7, 1.9]), [still(0.0)]
+    requested = reasons, model, np.array([1.7, 1.9]), [still(0.0)]
     assert next_steps(*requested) == ["Do this.", "And that."]
 
 
 def test_where_nothing_helps_it_says_so() -> None:
     model = LandingModel(NAMES, 1e-12 * np.eye(4), GRADIENT, np.zeros(2), np.ones(2))
     exact = LandingModel(NAMES, 1e-12 * np.eye(4), GRADIENT, np.full(2, 1e-9), np.ones(2))
-    assert next_steps("toy", [], None, np.array([1.7]), [still(0.0)]) == [
+    assert next_steps([], None, np.array([1.7]), [still(0.0)]) == [
         "Nothing more would narrow the landings by much: launch."
     ]
     assert model.after(draw=0.0)[0] == pytest.approx(1.0)
-    assert len(next_steps("toy", [], exact, np.array([1.7, 1.9]), [still(0.0)])) >= 1
+    assert len(next_steps([], exact, np.array([1.7, 1.9]), [still(0.0)])) >= 1

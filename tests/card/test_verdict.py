@@ -162,15 +162,16 @@ def test_findings_tell_what_was_odd_of_a_recording(summary) -> None:
 
 def test_findings_see_a_bad_score_a_side_and_odd_evidence(summary) -> None:
     rows = trials().assign(landing_y=[1.5, 2.1])
-    theta = dict(summary.theta, theta=summary.theta["theta"] | {"relaxation": 0.1996})
     launches = [{"left": None, "z_without_it": None}, {"left": -0.07, "z_without_it": -1.8}]
     recordings = [
         {"force_rms": force, "held_rms": 0, "recoil_rms": 0, "pictures": []}
         | {"source": {"file": f"{force}.mcap", "pull": 3}, "without_it": {"misfit": force}}
         for force in (0.1, 0.3)
     ]
-    theta["confidence"] = theta["confidence"] | {"launches": launches, "recordings": recordings}
-    result = findings(replace(summary, trials=rows, theta=theta))
+    confidence = summary.confidence | {"launches": launches, "recordings": recordings}
+    theta = replace(summary.found.theta, relaxation=0.1996)
+    found = replace(summary.found, theta=theta, confidence=confidence)
+    result = findings(replace(summary, launched=rows, found=found))
     assert (result.outside, result.left, result.force) == (1, 0.07, 0.3)
     assert (result.observed, result.surprising) == (1, 1)
     assert result.bias == pytest.approx(np.mean([1.5 / 1.92, 2.1 / 2.08]) - 1)

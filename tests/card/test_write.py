@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pipeline.params import load
+from pipeline.band_folder import write
+from pipeline.layout import Layout
+from sling2sim2real import Identification, aim
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.layout import Layout
 from sling2sim2real.card.text import GLOSSARY
-from sling2sim2real.card.write import write
-from tests.card.conftest import BAND, METHOD
+from tests.card.conftest import BAND, PAIR
 
 FILES = {
     "README.md", "card.json", "index.html", "animation.webp", "camera.webp", "force.png",
@@ -25,8 +25,18 @@ LIMITS = {"index.html": 3e6, "animation.webp": 2e6}  # bytes
 def folder(project, tmp_path_factory):
     """The card, written once."""
     root = shutil.copytree(project, tmp_path_factory.mktemp("written") / "project")
-    write(load(root / "params.yaml"), BAND, METHOD, root)
-    return Layout(root).card(BAND)
+    write(PAIR, root)
+    return Layout(root).card(PAIR) / "card"
+
+
+def test_its_folder_is_a_bands_folder(folder) -> None:
+    """What a run has found is aimed by the policy that it trained."""
+    names = {path.name for path in folder.parent.iterdir()}
+    assert names == {"band.yaml", "theta.json", "policy.onnx", "policy.json", "card"}
+    found = Identification.load(folder.parent)
+    assert not found.stale and found.band.name == BAND and found.fork
+    drawn = found.policy.draws(np.array([1.925]))[0]
+    np.testing.assert_array_equal(aim(found, 1.925, anyway=True).draw, drawn)
 
 
 def test_it_is_whole_and_small(folder) -> None:
@@ -54,14 +64,16 @@ def test_the_animation_plays(folder) -> None:
 
 
 def test_equal_inputs_give_equal_bytes(folder, copied) -> None:
-    write(load(copied / "params.yaml"), BAND, METHOD, copied)
+    write(PAIR, copied)
     for file in folder.iterdir():
-        assert file.read_bytes() == (Layout(copied).card(BAND) / file.name).read_bytes(), file.name
+        assert file.read_bytes() == (Layout(copied).card(PAIR) / "card" / file.name).read_bytes(), (
+            file.name
+        )
 
 
 def test_a_missing_input_leaves_nothing_half_written(copied) -> None:
     layout = Layout(copied)
-    layout.trials(BAND, METHOD).unlink()
-    with pytest.raises(UserError, match=r"data/trials/toy/posterior\.parquet"):
-        write(load(copied / "params.yaml"), BAND, METHOD, copied)
-    assert not layout.card(BAND).exists()
+    layout.trials(PAIR).unlink()
+    with pytest.raises(UserError, match=r"data/trials/toy-posterior\.parquet"):
+        write(PAIR, copied)
+    assert not layout.card(PAIR).exists()

@@ -1,171 +1,167 @@
-"""Aiming with a toy policy: the closed form says where the draw lands."""
+"""What `sling aim` and `sling launch` print: keys that scripts rely on, and the hand's pose."""
 
+import csv
 import json
-from types import SimpleNamespace
+import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
-from sling2sim2real.base.errors import UserError
-from sling2sim2real.cli.aim import aim, why_refused
-from sling2sim2real.launching.surface.stored import Stored
-from sling2sim2real.simulator.parameters import THETA
-from tests.policy import toy
+from sling2sim2real import Band, Identification, Settings, Theta
+from sling2sim2real.api.identification import Fork
+from sling2sim2real.api.launching import Aim, Hazard, Launch
+from sling2sim2real.cli.aim import of_aim
+from sling2sim2real.cli.plan.plan import plan_recording
+from tests.cli.lab import NAME
 from tests.policy.linear import write_policy
+from tests.project import python
 
-PARAMS = SimpleNamespace(
-    bands={"toy": SimpleNamespace(rest_length=toy.REST_LENGTH)},
-    run=SimpleNamespace(
-        bands=["toy"],
-        methods=["none", "other"],
-        own=[],
-        ablations=SimpleNamespace(bands=[], methods=[]),
-        dips=[],
-    ),
-    methods={"none": None, "other": None},
-    policy=SimpleNamespace(targets=(1.425, 2.425)),
-    trials=SimpleNamespace(actuation_error=0.001),
-    setup=SimpleNamespace(
-        max_force=15.0, fork_width=toy.FORK_WIDTH, draw_y=toy.DRAW_Y, draw_z=toy.DRAW_Z
-    ),
-    launch=SimpleNamespace(pull_time=None, pause=None),
-)
-
-ALWAYS = {"stretch", "confidence", "params", "mounting"}  # of a project with little in it
+FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target along the base's x
+TIPS = np.array([[-0.1375, 0, 0], [0.1375, 0, 0]])
+BAND = Band(mass=0.023, diameter=0.010, rest_length=0.52)
+FOUND = Identification(BAND, Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6), settings=Settings.default())
 
 
-@pytest.fixture(scope="module")
-def root(tmp_path_factory):
-    """A policy that hits 1.925 m and lands near its other targets."""
-    root = tmp_path_factory.mktemp("root")
-    along = np.linspace(*toy.DRAW_Y, 1001)
-    landing = toy.launch(np.column_stack([along, np.full(1001, -0.15)])).landing_y
-    short, far = np.interp([1.925, 2.425], landing[::-1], along[::-1])
-    slope = (far - short) / 0.5
-    write_policy(
-        root / "data/policies/toy/none/policy.onnx", (slope, 0), (short - 1.925 * slope, -0.15)
-    )
-    file = root / "data/theta/toy/none.json"
-    file.parent.mkdir(parents=True)
-    theta = dict.fromkeys(THETA, 0.4) | {"youngs_modulus": 4e5}
-    file.write_text(json.dumps({"band": "toy", "theta": theta}))
-    return root
+def at(y: float, z: float, pose: tuple | None, found: Identification = FOUND) -> dict:
+    """The answer for a draw, the fork there in the robot's base."""
+    hazards = (Hazard("box", "as before"),)
+    launched = Launch((y, z), 1.9, (1.8, 2.0), 4.0, 0.7, (0.0, 0.0), 9.0, None, None, hazards)
+    settings = found.settings.changed(setup={"base_to_fork": pose})
+    return of_aim(Aim(1.9, launched, hazards), replace(found, settings=settings))
 
 
-def shoot(root, target: float, launcher=toy.launch, **settings) -> dict:
-    params = SimpleNamespace(**{**vars(PARAMS), **settings})
-    return aim(params, "toy", "none", target, root, launcher=launcher)
+UNIT = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1)
+PLACE = st.lists(st.floats(-2, 2), min_size=3, max_size=3)
 
 
-def abouts(answer) -> set[str]:
-    return {warning.about for warning in answer["warnings"]}
+@given(place=PLACE, turn=UNIT, y=st.floats(-2, -0.05), z=st.floats(-2, 1))
+def test_band_hand_and_launch_lie_in_one_plane(place, turn, y, z) -> None:
+    """In the base, by a homogeneous matrix: all of the band's plane is across the hand's y."""
+    turn = np.array(turn) / np.linalg.norm(turn)
+    pose = at(y, z, (*place, *turn.tolist()))
+    to_base = np.eye(4)
+    to_base[:3, :3], to_base[:3, 3] = Rotation.from_quat(turn).as_matrix(), place
+
+    def in_base(point) -> np.ndarray:
+        return (to_base @ [*point, 1.0])[:3]
+
+    quaternion = np.array(pose["tcp_quaternion_xyzw"])
+    assert np.linalg.norm(quaternion) == pytest.approx(1.0, abs=1e-12) and quaternion[3] >= 0
+    axes = Rotation.from_quat(quaternion).as_matrix()
+    tcp = np.array(pose["tcp_position_m"])
+    np.testing.assert_allclose(tcp, in_base([0, y, z]), atol=1e-6)
+    seen = [axes.T @ (in_base(point) - tcp) for point in (*TIPS, np.zeros(3))]
+    np.testing.assert_allclose([way[1] for way in seen], 0.0, atol=2e-6)
+    left, right, origin = seen
+    np.testing.assert_allclose(origin, [0, 0, np.hypot(y, z)], atol=2e-6)  # straight ahead
+    np.testing.assert_allclose(right - left, [0.275, 0, 0], atol=1e-9)
+    assert (pose["tcp_frame"], pose["hold_force_n"], list(pose)[-1]) == ("base", 9.0, "warnings")
+    launch = np.array([0, np.cos(pose["pitch_rad"]), np.sin(pose["pitch_rad"])])
+    np.testing.assert_allclose(axes[:, 2], to_base[:3, :3] @ launch, atol=1e-12)
 
 
-def test_the_draw_lands_on_the_target(root) -> None:
-    answer = shoot(root, 1.925)
-    draw = np.array([[answer["draw_y_m"], answer["draw_z_m"]]])
-    truth = toy.launch(draw)
-    assert truth.landing_y[0] == pytest.approx(1.925, abs=0.02)
-    assert answer["predicted_landing_m"] == pytest.approx(truth.landing_y[0], abs=1e-6)
-    assert answer["hold_force_n"] == pytest.approx(truth.hold_force[0], abs=1e-6)
-    assert answer["max_force_n"] == 15.0
-    assert abouts(answer) == ALWAYS and why_refused(answer) is None
-    again = Stored("toy", "none", root).draws([1.925])
-    np.testing.assert_allclose(again, draw)
+def test_a_half_turn_about_the_approach_axis_as_the_docs_say() -> None:
+    """(qy, -qx, qw, -qz) points ahead alike, with the other side up."""
+    x, y, z, w = at(-0.3, -0.2, FORK_IN_BASE)["tcp_quaternion_xyzw"]
+    axes, turned = (Rotation.from_quat(q).as_matrix() for q in ((x, y, z, w), (y, -x, w, -z)))
+    np.testing.assert_allclose(turned, axes * [-1, -1, 1], atol=1e-12)
 
 
-def test_nine_landings_of_ten_lie_in_the_interval(root) -> None:
-    answer = shoot(root, 1.925)
-    draw = np.array([answer["draw_y_m"], answer["draw_z_m"]])
-    spread = draw + np.random.default_rng(0).normal(0, 0.001, (4000, 2))
-    low, high = answer["interval_90_m"]
-    landing = toy.launch(spread).landing_y
-    assert 0.88 < ((landing > low) & (landing < high)).mean() < 0.92
+def test_the_plan_of_a_recording_holds_the_same_draw_alike(tmp_path) -> None:
+    """By the CSV that a robot would follow: its pause."""
+    standing = (0.62, -0.05, 0.41, 0.02, -0.03, -0.7, float(np.sqrt(1 - 0.4913)))
+    settings = FOUND.settings.changed(setup={"base_to_fork": standing})
+    for draw in ((-0.40, 0.0), (-0.3, -0.25)):
+        plan = plan_recording(settings, BAND, draw=draw)
+        with plan.write(tmp_path, 100.0)[0].open(newline="") as file:
+            drawn = next(row for row in csv.DictReader(file) if row["phase"] == "pause")
+        pose = at(*draw, standing)
+        assert pose["tcp_frame"] == plan.frame
+        columns = "x y z", "qx qy qz qw"
+        position, turn = ([float(drawn[name]) for name in names.split()] for names in columns)
+        np.testing.assert_allclose(pose["tcp_position_m"], position, atol=1e-6)
+        np.testing.assert_allclose(pose["tcp_quaternion_xyzw"], turn, atol=1e-8)
 
 
-def test_what_is_known_of_theta_widens_the_interval(root) -> None:
-    """Samples whose landings spread by a tenth: nine of ten of those lie inside."""
-
-    def launcher(draws, parameters=None):
-        launched = toy.launch(draws)
-        if parameters is not None:
-            launched.landing_y = launched.landing_y * parameters.values[:, 0]
-        return launched
-
-    narrow = shoot(root, 1.925)["interval_90_m"]
-    spread = np.linspace(0.9, 1.1, 201)
-    file = root / "data/confidence/toy/none.json"
-    file.parent.mkdir(parents=True)
-    samples = np.tile(spread[:, None], (1, len(THETA))).tolist()
-    file.write_text(json.dumps({"names": list(THETA), "samples": samples}))
-    answer = shoot(root, 1.925, launcher=launcher)
-    file.unlink()
-    landing = answer["predicted_landing_m"]
-    assert abouts(answer) == ALWAYS
-    np.testing.assert_allclose(answer["interval_90_m"], [0.91 * landing, 1.09 * landing], rtol=0.01)
-    assert np.ptp(narrow) < 0.5 * np.ptp(answer["interval_90_m"])
+def test_setup_comes_before_the_recording_which_names_the_base() -> None:
+    recorded = replace(FOUND, fork=Fork(pose=(0.0, 0, 0, 0, 0, 0, 1.0), frame="arm"))
+    given = at(-0.3, -0.3, FORK_IN_BASE, recorded)
+    assert given["tcp_frame"] == "arm"
+    assert given["tcp_position_m"] == pytest.approx([0.4, 0.1, 0.1])
+    alone = at(-0.3, -0.3, None, recorded)
+    assert (alone["tcp_frame"], alone["tcp_position_m"]) == ("arm", [0.0, -0.3, -0.3])
 
 
-def test_says_the_pull_and_pause_that_rubber_takes_for_granted(root) -> None:
-    """The recording's, but for what params.yaml asks of a launch."""
-    file = root / "data/theta/toy/none.json"
-    before = file.read_text()
-    theta = json.loads(before)["theta"] | {
-        "mooney_share": 0.3,
-        "upturn": 0.0,
-        "softening": 0.0,
-        "relaxation": 0.02,
-        "flow": 0.1,
-        "log_flow_rate": 2.0,
-    }
-    history = {"pull_time": 4.0, "pause": 2.0}
-    rubber = {"band": "toy", "law": "rubber", "theta": theta, "history": history}
-    plain = shoot(root, 1.925)
-    file.write_text(json.dumps(rubber))
-    answer = shoot(root, 1.925, launch=SimpleNamespace(pull_time=None, pause=5.0))
-    file.write_text(before)
-    assert answer == plain | {"pull_and_pause_s": [4.0, 5.0]}
+def test_a_base_that_is_not_known_is_one_warning() -> None:
+    pose = at(-0.3, -0.3, None)
+    assert [pose[name] for name in pose if name.startswith("tcp")] == [None, None, None]
+    assert pose["pitch_rad"] == pytest.approx(np.pi / 4)
+    assert [hazard.about for hazard in pose["warnings"]] == ["box", "pose"]
+    assert "\n" not in str(pose["warnings"][1])
 
 
-def test_warns_outside_the_trained_range_and_refuses_above_the_force(root) -> None:
-    assert "target" in abouts(shoot(root, 2.7)) and "target" not in abouts(shoot(root, 2.4))
-    weak = SimpleNamespace(**{**vars(PARAMS.setup), "max_force": 1.0})
-    answer = shoot(root, 1.925, setup=weak)
-    assert "force" in abouts(answer) and "more than setup.max_force" in str(why_refused(answer))
+STABLE = ["draw_y_m", "draw_z_m", "predicted_landing_m", "interval_90_m", "hold_force_n"]
+POSE = ["pitch_rad", "tcp_frame", "tcp_position_m", "tcp_quaternion_xyzw"]
 
 
-def test_a_draw_that_misses_by_more_than_5_cm_is_to_be_refused(root) -> None:
-    for off, refused in ((0.04, False), (0.07, True)):
-
-        def beside(draws: np.ndarray, off: float = off):
-            launched = toy.launch(draws)
-            launched.landing_y = launched.landing_y + off
-            return launched
-
-        answer = shoot(root, 1.925, launcher=beside)
-        assert ("miss" in abouts(answer)) is refused is (why_refused(answer) is not None)
-
-
-def test_a_failed_launch_has_no_prediction_and_failures_beside_it_no_interval(root) -> None:
-    for most, lands, warning in ((0, False, "failure"), (1, True, "interval")):
-
-        def broken(draws: np.ndarray):
-            launched = toy.launch(draws)
-            failed = len(draws) > most  # noqa: B023
-            launched.failure = ["it broke" if failed else None] * len(draws)
-            return launched
-
-        answer = shoot(root, 1.925, launcher=broken)
-        assert (answer["predicted_landing_m"] is not None) is lands
-        assert answer["interval_90_m"] is None and warning in abouts(answer)
-        assert (why_refused(answer) is None) is lands
+def test_aim_prints_one_json_object(copied, sling) -> None:
+    """The keys that scripts rely on; the text has them too."""
+    arguments = ("aim", f"bands/{NAME}", "--target", "1.9")
+    done = sling(*arguments, "--json", folder=copied)
+    answer = json.loads(done.stdout)
+    assert list(answer) == [*STABLE, "max_force_n", "pull_and_pause_s", *POSE, "warnings"]
+    assert answer["predicted_landing_m"] == pytest.approx(1.9, abs=1e-3)
+    assert answer["interval_90_m"][0] < 1.9 < answer["interval_90_m"][1]
+    assert answer["tcp_frame"] == "base" and done.returncode == 0
+    done = sling(*arguments, folder=copied)
+    shown = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
+    assert [*shown] == [*answer][:-1] and shown["predicted_landing_m"] == "1.9"
 
 
-def test_says_what_is_missing(root) -> None:
-    for band, method, message in (
-        ("none", "none", "band none: not in params.yaml, which has toy"),
-        ("toy", "missing", "method missing: not in params.yaml"),
-        ("toy", "other", "data/theta/toy/other.json: missing"),
-    ):
-        with pytest.raises(UserError, match=message):
-            aim(PARAMS, band, method, 1.925, root, launcher=toy.launch)
+def test_a_target_that_no_draw_hits_is_refused_with_those_that_can_be(copied, sling) -> None:
+    """Its exit status is its own; --force answers all the same. By a policy too."""
+    arguments = ("aim", NAME, "--target", "19")  # a name in bands/ will do
+    done = sling(*arguments, folder=copied)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (3, "", 1)
+    assert "draws of the box (setup.draw_y, draw_z) land from" in done.stderr
+    done = sling(*arguments, "--json", folder=copied)
+    assert done.returncode == 3 and json.loads(done.stdout).keys() == {"refused"}
+    done = sling(*arguments, "--force", "--json", folder=copied)
+    abouts = {warning["about"] for warning in json.loads(done.stdout)["warnings"]}
+    assert done.returncode == 0 and abouts & {"miss", "force"}
+
+    write_policy(copied / "bands/toy/policy.onnx", slope=(-0.01, 0.0), offset=(-0.31, -0.15))
+    assert "policy.json: missing" in sling(*arguments, folder=copied).stderr
+
+
+def test_launch_prints_one_json_object(fitted, tmp_path, sling) -> None:
+    """By the band's θ, and by one that was written by hand."""
+    keys = ["landing_y_m", "interval_90_m", "speed_m_s", "hold_force_n", "pull_and_pause_s"]
+    arguments = ("launch", f"bands/{NAME}", "--draw=-0.30,-0.17", "--json")
+    first = json.loads(sling(*arguments, folder=fitted).stdout)
+    assert list(first) == [*keys, "failure", "warnings"]
+    assert first["failure"] is None and 0.5 < first["landing_y_m"] < 6.0
+    theta = tmp_path / "theta.json"
+    five = vars(FOUND.theta)
+    names = ("youngs_modulus", "poissons_ratio", "elasticity_damping", "dynamic_friction")
+    content = {name: five[name] for name in (*names, "damping_scale")}
+    theta.write_text(json.dumps({"band": "any", "theta": content}))
+    done = sling(*arguments, "--theta", str(theta), folder=fitted)
+    mine = json.loads(done.stdout)
+    assert mine["landing_y_m"] != first["landing_y_m"] and "pull_and_pause_s" not in mine
+    assert [row["about"] for row in mine["warnings"]] == ["confidence"]
+    broken = sling("launch", f"bands/{NAME}", "--draw=-0.45,-0.30", "--json", folder=fitted)
+    if json.loads(broken.stdout)["failure"]:
+        assert json.loads(broken.stdout)["landing_y_m"] is None
+
+
+@pytest.mark.slow
+def test_the_command_as_a_process(fitted, tmp_path) -> None:
+    shutil.copytree(fitted, tmp_path / "lab")
+    command = ("-m", "sling2sim2real", "aim", "bands/toy", "--target", "1.9", "--json")
+    done = python(*command, folder=tmp_path / "lab")
+    assert done.returncode == 0 and json.loads(done.stdout)["draw_y_m"] < 0, done.stderr

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
-from pipeline.params import load
+from sling2sim2real.api.band_folder import lab_settings
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.cli.setup import LabMeasures, confirmed, fork_of, requested, set_up, shown
-from tests.project import DEFAULTS
+from sling2sim2real.cli.setup import LabMeasures, fork_of, set_up, shown
 
 LEFT, RIGHT = (0.70, 0.1375, 0.42), (0.70, -0.1375, 0.42)  # the target along the base's x
 FORK = (0.7, 0, 0.42, 0, 0, -(0.5**0.5), 0.5**0.5)
@@ -25,8 +24,10 @@ ASIDE = (0.7, 0.0, 0.98, 0.0, 0.0, 0.0, 1.0)
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    file = tmp_path / "params.yaml"
-    file.write_text(DEFAULTS.read_text(encoding="utf-8"), encoding="utf-8")
+    """A lab.yaml with settings of its own."""
+    file = tmp_path / "bands/lab.yaml"
+    file.parent.mkdir()
+    file.write_text("plan: {pause: 1.5}\nsetup: {foot_height: 0.01}\n", encoding="utf-8")
     return file
 
 
@@ -47,7 +48,6 @@ def test_the_fork_is_where_its_tips_are(x, y, z, width, yaw) -> None:
 
 
 def test_everything_is_written_and_nothing_else_changes(path) -> None:
-    before = path.read_text().splitlines()
     measured = LabMeasures(
         left_tip=LEFT,
         right_tip=RIGHT,
@@ -57,8 +57,8 @@ def test_everything_is_written_and_nothing_else_changes(path) -> None:
         draw_y=(-0.44, -0.26),
     )
     done = set_up(measured, path)
-    assert done["written"] and list(done["changed"])[0] == "max_force"
-    setup = load(path).setup
+    assert list(done["changed"])[0] == "max_force"
+    setup = lab_settings(path).setup
     assert setup.base_to_fork == pytest.approx(FORK, abs=1e-5)
     assert (setup.fork_height, setup.max_force, setup.draw_y) == (0.62, 25.0, (-0.44, -0.26))
     seen = np.eye(4)
@@ -68,25 +68,33 @@ def test_everything_is_written_and_nothing_else_changes(path) -> None:
     np.testing.assert_allclose(seen @ [0, 0, 0, 1], [0, 0, 0.98, 1], atol=1e-5)
     # the fork's y is the base's x, which a camera that looks down has as its x
     np.testing.assert_allclose(seen @ [0, 1, 0, 1], [1, 0, 0.98, 1], atol=1e-4)
-    after = path.read_text().splitlines()
-    notes = [[line.partition("#")[2] for line in lines if "#" in line] for lines in (before, after)]
-    assert notes[0] == notes[1]
-    old, new = (YAML(typ="safe").load("\n".join(lines)) for lines in (before, after))
-    keys = {key for key, value in new["setup"].items() if old["setup"][key] != value}
-    assert keys == done["changed"].keys() and len(keys) == 5
-    assert new | {"setup": old["setup"]} == old
+    new = YAML(typ="safe").load(path.read_text())
+    assert new["setup"].keys() == {"foot_height", *done["changed"]} and len(done["changed"]) == 5
+    assert new["plan"] == {"pause": 1.5} and new["setup"]["foot_height"] == 0.01
+    after = path.read_bytes()
     text = shown(done)
     assert "setup.max_force: 30 -> 25" in text and "setup.base_to_fork: null -> [0.7, 0, " in text
     again = set_up(measured, path)
-    assert (again["changed"], again["written"]) == ({}, False) and "nothing changes" in shown(again)
-    assert path.read_text().splitlines() == after
+    assert again["changed"] == {} and "nothing changes" in shown(again)
+    assert path.read_bytes() == after
+
+
+def test_a_tool_and_topics_are_taken_down(path) -> None:
+    tool, topics = (0.7, 0.0, 0.0, 0.05), (("wrench", "/ft"), ("pose", "/tcp"))
+    set_up(LabMeasures(tool=tool, topics=topics), path)
+    set_up(LabMeasures(topics=(("pose", "/ee"),)), path)
+    setup = lab_settings(path).setup
+    assert (setup.tool.mass, setup.tool.center) == (0.7, (0.0, 0.0, 0.05))
+    assert (setup.topics.wrench, setup.topics.pose) == ("/ft", "/ee")
+    with pytest.raises(UserError, match="setup.tool.mass: must be between 0 and 20, got 700"):
+        set_up(LabMeasures(tool=(700, 0.0, 0.0, 0.05)), path)
 
 
 def test_two_of_three_poses_give_the_fork_in_the_base(path) -> None:
     """By way of the camera alone: no tip was touched."""
     seen = (0.0, 0.0, 0.98, 0.5**0.5, 0.5**0.5, 0.0, 0.0)
     set_up(LabMeasures(base_to_camera=LOOKING_DOWN, camera_to_fork=seen, floor=-0.1), path)
-    setup = load(path).setup
+    setup = lab_settings(path).setup
     assert setup.base_to_fork == pytest.approx(FORK, abs=1e-5)
     assert setup.fork_height == pytest.approx(0.52)
     touched = {"left_tip": LEFT, "right_tip": RIGHT, "base_to_camera": LOOKING_DOWN}
@@ -145,32 +153,21 @@ def test_what_contradicts_is_one_line_and_nothing_is_written(path, measured, wor
     assert path.read_bytes() == before
 
 
-def test_a_user_is_asked_and_may_say_no(path, capsys) -> None:
-    lines = iter(["0.7,0.1375,0.42", "mm", "700,-137.5,420", "0.7,-0.1375,0.42", *6 * [""]])
-    measured = requested(lambda question: next(lines))
-    assert measured == LabMeasures(left_tip=LEFT, right_tip=RIGHT)
-    summary = capsys.readouterr().err
-    assert "must be X,Y,Z, got 'mm'" in summary and "which looks like millimetres (0.7)" in summary
-    before = path.read_bytes()
-    done = set_up(measured, path, lambda message: confirmed(message, lambda question: "n"))
-    assert path.read_bytes() == before and "nothing was written" in shown(done)
-    assert "nothing was written" not in capsys.readouterr().err
-    assert set_up(measured, path, lambda message: confirmed(message, lambda question: ""))[
-        "written"
-    ]
-
-
 def test_the_command_line(path, sling) -> None:
-    done = sling("setup", "--max-force=20", "--json", folder=path.parent)
+    lab = path.parents[1]
+    done = sling("setup", "--max-force=20", "--topic", "wrench=/ft", "--json", folder=lab)
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["changed"] == {"max_force": {"old": 30.0, "new": 20.0}}
+    changed = json.loads(done.stdout)["changed"]
+    assert changed["max_force"] == {"old": 30.0, "new": 20.0}
+    assert changed["topics"] == {"old": {}, "new": {"wrench": "/ft"}}
     assert YAML(typ="safe").load(path.read_text())["setup"]["max_force"] == 20.0
     for arguments, words in (
         ((), "nothing to set up"),
         (("--left-tip", "-0.7,0.1,0.4"), "one that begins with - is joined by =: --left-tip=-..."),
+        (("--topic", "force=/ft"), "must be ROLE=TOPIC, of wrench, pose"),
         (("--floor=-520",), "must be in metres, from -10 to 10, got -520, which looks like milli"),
         (("--base-to-camera=1,2,3,0,0,0,2",), "its quaternion must have length 1, not 2"),
     ):
-        done = sling("setup", *arguments, folder=path.parent)
+        done = sling("setup", *arguments, folder=lab)
         assert done.returncode in (1, 2) and words in done.stderr
         assert done.stderr.count("\n") == 1

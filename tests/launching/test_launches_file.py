@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.launching.launches_file import (
+from sling2sim2real.base.launches_file import (
     COLUMNS,
     MORE,
     LaunchRow,

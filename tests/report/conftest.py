@@ -12,9 +12,9 @@ from pipeline.params import load
 from pipeline.report import report as reporting
 from pipeline.report import write as writing
 from pipeline.report.results import Result, Results, gather
+from sling2sim2real.base.launches_file import write_launches
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.searches.regions import Region, save_regions
-from sling2sim2real.launching.launches_file import write_launches
 from sling2sim2real.simulator.parameters import THETA as NAMES
 from tests.policy.stored import write_stored
 from tests.project import DEFAULTS, write_params_of

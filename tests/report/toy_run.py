@@ -10,8 +10,8 @@ import pandas as pd
 from pipeline.layout import Layout
 from pipeline.params import Params, load
 from pipeline.params.run import RunParams
+from sling2sim2real.base.launches_file import COLUMNS, MORE
 from sling2sim2real.identification.searches.regions import Region, save_regions
-from sling2sim2real.launching.launches_file import COLUMNS, MORE
 from sling2sim2real.settings.identification import LAWS
 from sling2sim2real.simulator.parameters import THETA as NAMES
 from tests.project import with_

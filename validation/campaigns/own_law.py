@@ -139,7 +139,7 @@ def _seen(
         way = np.linalg.norm(line[sling.middle] - held) if time > true.release_time else 0.0
         _, edge, part = nearest(points.astype(float), line)
         at = place[edge] + part * np.diff(place)[edge]
-        off = rng.normal(0, np.hypot(has.cloud, has.way * way), (BINS, 3))
+        off = rng.normal(0, np.hypot(has.cloud, has.recoil * way), (BINS, 3))
         points = points + off[np.minimum((at * BINS).astype(int), BINS - 1)] - true.camera
         clouds.append((turn.apply(points) + true.camera + shift).astype(np.float32))
     return clouds

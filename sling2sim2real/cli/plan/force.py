@@ -10,11 +10,12 @@ from typing import cast
 import numpy as np
 from scipy.optimize import brentq
 
-from pipeline.params import Params
+from sling2sim2real.api.identification import Identification
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.cli.safety import of_mounting, tell
 from sling2sim2real.recording.transforms import Transform
-from sling2sim2real.settings.lab import BandParams, SetupParams
+from sling2sim2real.settings import Settings
+from sling2sim2real.settings.lab import SetupParams
+from sling2sim2real.simulator.model import BandSizes
 
 ALIKE = 0.02  # relative: stretches that are as good as equal
 GENTLE = 1.25  # stretch of a first pull, where nothing is known of the force
@@ -43,7 +44,7 @@ class Earlier:
     problem: str | None
 
 
-def read_earlier(path: Path, params: Params) -> Earlier:
+def read_earlier(path: Path, params: Settings) -> Earlier:
     """Read a recording as far as a plan needs it: no pictures. Raises UserError.
 
     Of several pulls, the first that can be used.
@@ -85,7 +86,7 @@ class Held:
     rest_length: float
 
     @classmethod
-    def of(cls, band: BandParams, setup: SetupParams) -> Held:
+    def of(cls, band: BandSizes, setup: SetupParams) -> Held:
         return cls(setup.fork_width / 2, band.rest_length)
 
     def legs(self, point: np.ndarray) -> tuple[float, float]:
@@ -119,19 +120,18 @@ class Prediction:
 
 
 def predict(
-    params: Params, band: str, drawn: np.ndarray, theta: Path | None, earlier: Earlier | None
+    held: Held, drawn: np.ndarray, found: Identification | None, earlier: Earlier | None
 ) -> Prediction:
     """The force at `drawn` (3,): by the simulator, else by an earlier recording, else unknown."""
-    held = Held.of(params.bands[band], params.setup)
     stretch = held.stretch(drawn)
-    if theta is not None:
-        return Prediction(_simulated(params, band, drawn, theta), f"simulated with {theta}")
+    if found is not None:
+        return Prediction(_simulated(found, drawn), "simulated with its θ")
     if earlier and earlier.force is not None and earlier.drawn is not None:
         was = held.stretch(earlier.drawn)
         if was <= 1:
             raise UserError(
                 f"{earlier.path}: holds {earlier.force:.1f} N where the band should be slack, at"
-                f" {was:.2f} of bands.{band}.rest_length {held.rest_length:g}: correct that length,"
+                f" {was:.2f} of its rest length {held.rest_length:g} m: correct that length,"
                 " or give a recording of this band"
             )
         force = earlier.force * held.force(drawn) / held.force(earlier.drawn)
@@ -141,7 +141,7 @@ def predict(
         if stretch > (1 + ALIKE) * was:
             source += ", and beyond that stretch a band may stiffen"
         return Prediction(force, source)
-    why = "no θ file and no recording was given"
+    why = "the band is not identified, and no recording was given"
     if earlier is not None:
         why = earlier.problem
     advice = ""
@@ -154,22 +154,11 @@ def predict(
     return Prediction(None, f"not checked: {why}; the band is stretched to {stretch:.2f}{advice}")
 
 
-def _simulated(params: Params, band: str, drawn: np.ndarray, path: Path) -> float:
-    from sling2sim2real.identification.results.theta import (
-        calibrated,
-        launch_setup,
-        load_theta,
-        parameters_of,
-    )
-    from sling2sim2real.simulator.launch import launch
-
-    content = load_theta(path, band)
-    tell(of_mounting(params, band, Path()))
-    sling, setup = calibrated(params, band, content), launch_setup(params, content)
-    force = float(launch(sling, setup, parameters_of(content), drawn[1:]).hold_force[0])
+def _simulated(found: Identification, drawn: np.ndarray) -> float:
+    force = float(found.launches(drawn[1:]).hold_force[0])
     if not np.isfinite(force):
         raise UserError(
-            f"{path}: the simulated hold of draw [{drawn[1]:g}, {drawn[2]:g}] does not converge:"
-            " plan without --theta"
+            f"{found.band.name}: the simulated hold of draw [{drawn[1]:g}, {drawn[2]:g}] does not"
+            " converge: draw less far"
         )
     return force

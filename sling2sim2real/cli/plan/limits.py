@@ -11,8 +11,9 @@ from sling2sim2real.cli.plan.force import Held, Prediction
 from sling2sim2real.cli.plan.pull import BACK
 from sling2sim2real.cli.plan.trajectory import Trajectory
 from sling2sim2real.episode.planned import PULL, leg_time
-from sling2sim2real.settings.lab import BandParams, PlanParams, SetupParams
+from sling2sim2real.settings.lab import PlanParams, SetupParams
 from sling2sim2real.settings.recording import EpisodeParams
+from sling2sim2real.simulator.model import BandSizes
 
 ROUNDING = 1e-6  # relative
 LEAST_STRETCH = 1.10  # below it the drawn band shows little of its rubber
@@ -46,7 +47,7 @@ def check_draw(setup: SetupParams, held: Held, drawn: np.ndarray) -> None:
         )
 
 
-def check_hand(plan: PlanParams, band: BandParams, axis: np.ndarray, drawn: np.ndarray) -> None:
+def check_hand(plan: PlanParams, band: BandSizes, axis: np.ndarray, drawn: np.ndarray) -> None:
     """The open fingers take the band, and point to the fork from the draw."""
     if plan.gripper.open <= band.diameter:
         raise UserError(

@@ -4,29 +4,31 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.params import Params
+from sling2sim2real.api.arguments import USUAL
+from sling2sim2real.api.band_folder import BandFolder, lab_settings
+from sling2sim2real.api.identification import Identification
+from sling2sim2real.api.model import Band
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import replacing, write_json, write_text
-from sling2sim2real.base.layout import Layout
 from sling2sim2real.cli.arguments import PULLS
+from sling2sim2real.cli.command_line import say
 from sling2sim2real.cli.plan import limits, messages
 from sling2sim2real.cli.plan.force import Earlier, Held, Prediction, predict, read_earlier
 from sling2sim2real.cli.plan.hand import along_pull, quaternion
 from sling2sim2real.cli.plan.pull import hanging_middle, trajectory_of
 from sling2sim2real.cli.plan.trajectory import Trajectory
-from sling2sim2real.cli.pose import fork_in_base
-from sling2sim2real.cli.sizes import band_to_come
+from sling2sim2real.cli.preflight.check import MASS, expect_long
 from sling2sim2real.recording.frames import FORK
 from sling2sim2real.recording.transforms import Transform
-from sling2sim2real.settings import expect_known
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import Gripper
 
 INFORMATIVE, PAPER = PULLS
@@ -183,93 +185,97 @@ class Plan:
         return files
 
 
-def with_band(
-    params: Params,
-    name: str | None,
-    mass: float | None = None,
-    diameter: float | None = None,
-    rest_length: float | None = None,
-):
-    """Params and a band's name: of a band that is there, or with sizes of one that is not yet.
+class KnownBand(NamedTuple):
+    """What a plan is made for; `found` and `recordings` of a band that is there."""
+
+    settings: Settings
+    band: Band
+    recordings: list[Path]
+    found: Identification | None
+
+
+def known_band(place: Path | None, sizes: dict[str, float]) -> KnownBand:
+    """The band of a folder, or one to come of some sizes and usual ones.
 
     Raises:
-        UserError: Neither a name nor sizes, or both for one band.
+        UserError: Neither a folder nor sizes, or both.
     """
-    if mass is diameter is rest_length is None:
-        if name is None:
-            raise UserError("give --band, or --diameter and --rest-length of a band to come")
-        return params, name
-    if name in params.bands:
-        raise UserError(f"--band {name} brings its sizes from params.yaml: leave the others out")
-    band = band_to_come(params, mass, diameter, rest_length)
-    name = name or "new"
-    return params.model_copy(update={"bands": {**params.bands, name: band}}), name
+    if place is None:
+        if not sizes:
+            raise UserError("give a band's folder, or --diameter and --rest-length of one to come")
+        whole = {"mass": MASS, **USUAL, **sizes}
+        if taken := [f"--{n.replace('_', '-')} {USUAL[n]:g}" for n in USUAL if n not in sizes]:
+            say(f"assumed: {' and '.join(taken)}")
+        settings = lab_settings()
+        expect_long(whole["rest_length"], settings.setup)
+        return KnownBand(settings, Band(**whole, name="new"), [], None)
+    folder = BandFolder.at(place)
+    if sizes:
+        raise UserError(f"{folder.band_file} has the band's sizes: leave these out")
+    found = Identification.load(folder.path) if folder.theta.is_file() else None
+    return KnownBand(folder.settings, folder.band, folder.recordings, found)
 
 
 def plan_recording(
-    params: Params,
-    band: str,
+    params: Settings,
+    band: Band,
     *,
+    recordings: Sequence[Path] = (),
+    found: Identification | None = None,
     draw: tuple[float, float] | None = None,
-    theta: Path | None = None,
-    recording: Path | None = None,
     pull: str = INFORMATIVE,
     precondition: int = 0,
     pulls: int = 1,
-    root: str | Path = ".",
-    progress: Callable[[str], None] = lambda line: None,
 ) -> Plan:
-    """Plan the recording of a band of params.yaml and check it against every limit.
+    """Plan the recording of a band and check it against every limit.
 
-    Where the fork stands in the robot's base is taken from setup.base_to_fork, else from
-    `recording`, else from the band's recordings and episodes; else all is in frame O.
+    Where the fork stands in the robot's base is taken from setup.base_to_fork, else from the first
+    of `recordings` that can be read, else from what was identified; else all is in frame O.
 
     Args:
+        params: Settings of the lab.
+        band: Whose recording it is to be.
+        recordings: Earlier ones of this rig and of this band, which also tell the force.
+        found: The band, where it has been identified: it tells the force too.
         draw: Drawn position (y, z), frame O [m]; plan.draw if None.
-        theta: θ file that says what holding the draw takes.
-        recording: Earlier one of this rig and of this band, which also tells the force; None: the
-            first of the band's in the project that can be read.
-        pull: INFORMATIVE with plan.dips, PAPER without, DESIGNED with dips that are searched now.
+        pull: INFORMATIVE with plan.dips, PAPER without.
         precondition: How often the band is stretched to the draw first, in the first grasp.
         pulls: How many in one recording; between two the hand returns and grasps again.
-        root: Folder of the project.
-        progress: Of a search, a line now and then.
 
     Raises:
         UserError: in one line, where a limit is broken or something is not known.
     """
-    expect_known(params, "band", band)
     if precondition > MOST_PULLS:
         raise UserError(f"--precondition: at most {MOST_PULLS}, got {precondition}")
     if pulls > MOST_PULLS:
         raise UserError(f"--pulls: at most {MOST_PULLS} in one recording, got {pulls}")
-    setup, band_params = params.setup, params.bands[band]
+    setup = params.setup
     settings = params.plan if draw is None else params.plan.model_copy(update={"draw": draw})
-    earlier = recorded(params, band, recording, root)
-    base, source, frame = _standing(params, band, earlier, root)
+    earlier = _earlier(params, recordings)
+    base, source, frame = _standing(params, earlier, found)
     if source is None and settings.orientation is not None:
         raise UserError(f"plan.orientation is the hand's in the robot's base: {NO_BASE}")
     drawn = np.array([0.0, *settings.draw])
-    held = Held.of(band_params, setup)
+    held = Held.of(band, setup)
     limits.check_draw(setup, held, drawn)
     given = settings.orientation  # else it looks along the pull at the fork
     hand = Rotation.from_quat(given) if given else base.rotation * along_pull(drawn)
     axis = (base.rotation.inv() * hand).apply([0.0, 0.0, 1.0])
-    limits.check_hand(settings, band_params, axis, drawn)
-    prediction = predict(params, band, drawn, theta, earlier)
+    limits.check_hand(settings, band, axis, drawn)
+    prediction = predict(held, drawn, found, earlier)
 
     dips = settings.dips if pull == INFORMATIVE else ()
     plan = settings.model_copy(update={"dips": dips})
     limits.check_dips(plan)
-    trajectory = trajectory_of(plan, setup, params.episode, band_params, axis, pulls, precondition)
+    trajectory = trajectory_of(plan, setup, params.episode, band, axis, pulls, precondition)
     limits.check_motion(trajectory, plan)
     limits.check_floor(trajectory, setup, plan)
     held_time, most_time = limits.check_window(trajectory, plan, params.episode, precondition)
     limits.check_force(setup, held, drawn, prediction)
-    below = -hanging_middle(settings, setup, band_params)[2]
+    below = -hanging_middle(settings, setup, band)[2]
     by = "as a string's catenary" if settings.hanging is None else "plan.hanging"
     return Plan(
-        band=band,
+        band=band.name,
         trajectory=trajectory,
         base=base,
         base_source=source,
@@ -288,23 +294,21 @@ def plan_recording(
     )
 
 
-def recorded(
-    params: Params, band: str, recording: Path | None, root: str | Path = "."
-) -> Earlier | None:
-    """What the recording tells, or else the first of the band's in the project that can be read.
-
-    Raises UserError where the one that is given cannot be.
-    """
-    if recording is not None:
-        return read_earlier(recording, params)
-    for path in Layout(Path(root)).recordings(band):
-        with suppress(UserError):
+def _earlier(params: Settings, recordings: Sequence[Path]) -> Earlier | None:
+    """What the first recording tells that can be read. Raises UserError where none can."""
+    problem = None
+    for path in recordings:
+        try:
             return read_earlier(path, params)
+        except UserError as error:
+            problem = problem or error
+    if problem:
+        raise problem
     return None
 
 
 def _standing(
-    params: Params, band: str, earlier: Earlier | None, root: str | Path
+    params: Settings, earlier: Earlier | None, found: Identification | None
 ) -> tuple[Transform, str | None, str]:
     """Frame O to the robot's base, where that came from (None: from nowhere), the base's name."""
     if earlier is not None:
@@ -312,12 +316,13 @@ def _standing(
         if not source.startswith("setup"):
             source = f"{source} of {earlier.path}"
         return earlier.base.inverse(), source, earlier.frame or params.plan.frame
-    try:
-        fork, frame = fork_in_base(params, band, root)
-    except UserError:
-        return Transform.identity(), None, FORK
-    given = params.setup.base_to_fork is not None
-    return fork, "setup.base_to_fork" if given else "the band's first episode", frame
+    if params.setup.base_to_fork is not None:
+        fork = Transform.of(params.setup.base_to_fork)
+        return fork, "setup.base_to_fork", params.plan.frame
+    if found is not None and found.fork is not None:
+        source = "the recording that it was identified from"
+        return Transform.of(found.fork.pose), source, found.fork.frame or params.plan.frame
+    return Transform.identity(), None, FORK
 
 
 def _plain(vector: np.ndarray) -> list[float]:

@@ -16,8 +16,9 @@ from sling2sim2real.cli.plan.trajectory import Phase, Trajectory
 from sling2sim2real.episode.planned import LET_BACK, REDRAW, leg_time, legs_of
 from sling2sim2real.episode.window import LEAD
 from sling2sim2real.recording.events import CALM
-from sling2sim2real.settings.lab import BandParams, PlanParams, SetupParams
+from sling2sim2real.settings.lab import PlanParams, SetupParams
 from sling2sim2real.settings.recording import EpisodeParams
+from sling2sim2real.simulator.model import BandSizes
 
 TICK = 0.001  # s: phases last whole ticks
 STRETCH, SLACKEN = "stretch", "slacken"  # a preconditioning pull, and back to the fork
@@ -41,7 +42,7 @@ def catenary_sag(length: float, width: float) -> float:
     return width / (2 * u) * (math.cosh(u) - 1)
 
 
-def hanging_middle(plan: PlanParams, setup: SetupParams, band: BandParams) -> np.ndarray:
+def hanging_middle(plan: PlanParams, setup: SetupParams, band: BandSizes) -> np.ndarray:
     """Where the fingers take the band, frame O, shape (3,): plan.hanging, else a catenary's."""
     below = plan.hanging
     if below is None:
@@ -53,7 +54,7 @@ def trajectory_of(
     plan: PlanParams,
     setup: SetupParams,
     episode: EpisodeParams,
-    band: BandParams,
+    band: BandSizes,
     axis: np.ndarray,
     pulls: int = 1,
     precondition: int = 0,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from sling2sim2real.api.arguments import USUAL
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.preflight.facts import (
     BandFacts,
@@ -16,7 +17,6 @@ from sling2sim2real.cli.preflight.facts import (
     SignalSummary,
 )
 from sling2sim2real.cli.preflight.report import CheckReport, Chosen, Topic
-from sling2sim2real.cli.sizes import assumed, band_to_come
 from sling2sim2real.episode.phases import phases_of_hand, unseen
 from sling2sim2real.recording.build import Processed, Whole, process
 from sling2sim2real.recording.checks import Finding
@@ -25,8 +25,10 @@ from sling2sim2real.recording.events import parts_of
 from sling2sim2real.recording.files import Container, read_container, sha256
 from sling2sim2real.recording.frames import geometry_of
 from sling2sim2real.recording.streams import Recording, recording_of
-from sling2sim2real.settings import Settings, expect_known
-from sling2sim2real.settings.lab import BandParams
+from sling2sim2real.settings import Settings
+from sling2sim2real.settings.lab import BandParams, SetupParams
+
+MASS = 0.03  # kg: stands for what is not known, and nothing is judged by it
 
 
 @dataclass(frozen=True)
@@ -53,11 +55,36 @@ class GivenBand:
     source: str = "given"
     weighed: bool = True
 
+    @classmethod
+    def of(cls, sizes: Mapping[str, float], setup: SetupParams) -> GivenBand:
+        """A band of some sizes, with usual ones for the others.
+
+        Raises UserError where it does not reach across the fork.
+        """
+        whole = {"mass": MASS, **USUAL, **sizes}
+        names = [name for name in USUAL if name not in sizes]
+        source = "given"
+        if names:
+            taken = " and ".join(f"--{n.replace('_', '-')} {USUAL[n]:g}" for n in names)
+            source = f"assumed: {taken}; give yours"
+        expect_long(whole["rest_length"], setup)
+        band = BandParams(source="recording", **whole)
+        return cls(band, source, weighed="mass" in sizes)
+
     @property
     def facts(self) -> BandFacts:
         band = self.params
         mass = float(band.mass) if self.weighed else None
         return BandFacts(float(band.diameter), float(band.rest_length), self.source, mass)
+
+
+def expect_long(rest_length: float, setup: SetupParams) -> None:
+    """Raises UserError where a band does not reach from tip to tip."""
+    if rest_length <= setup.fork_width:
+        raise UserError(
+            f"--rest-length {rest_length:g}: must be longer than setup.fork_width"
+            f" {setup.fork_width:g}"
+        )
 
 
 def look_at(
@@ -104,29 +131,6 @@ def look_at(
     chosen = looks[pull - 1] if pull else (usable or looks)[0]
     chosen.report.pulls = [look.report.row for look in looks]
     return replace(chosen, pulls=processed)
-
-
-def band_of(
-    params: Settings,
-    name: str | None = None,
-    mass: float | None = None,
-    diameter: float | None = None,
-    rest_length: float | None = None,
-) -> GivenBand:
-    """The band that a command line names, or one of the sizes that it gives.
-
-    Raises:
-        UserError: about a name that is not known, or a band that does not reach across the fork.
-    """
-    if name is not None:
-        if mass or diameter or rest_length:
-            raise UserError("--band brings its mass, diameter and rest length: leave these out")
-        expect_known(params, "band", name, called="--band")
-        return GivenBand(params.bands[name], f"bands.{name} of params.yaml")
-    taken = assumed(diameter, rest_length)
-    source = f"assumed: {taken}; give yours, or --band" if taken else "given"
-    band = band_to_come(params, mass, diameter, rest_length)
-    return GivenBand(band, source, weighed=mass is not None)
 
 
 def _look_at_pull(report: CheckReport, done: Processed) -> Look:

@@ -15,11 +15,12 @@ from sling2sim2real.base.imported import imported, is_import
 from sling2sim2real.identification.objective.evaluate import Simulate, simulated
 from sling2sim2real.settings.identification import OUR_ENGINE
 
-GROUP = "sling2sim2real.engines"  # of entry points: engines that installed packages offer
+# Of entry points: engines that installed packages offer.
+ENTRY_POINT_GROUP = "sling2sim2real.engines"
 
 
 def simulate_of(engine: str) -> Simulate:
-    """The function of an engine: OUR_ENGINE, one of GROUP, or a user's `package.module:function`.
+    """The function of an engine: OUR_ENGINE, an installed package's, or `package.module:function`.
 
     Raises UserError where there is no such function.
     """
@@ -37,6 +38,8 @@ def simulate_of(engine: str) -> Simulate:
 
 def _installed(engine: str) -> str:
     """Where an installed package has an engine, as `package.module:function`."""
-    for entry in entry_points(group=GROUP, name=engine):
+    for entry in entry_points(group=ENTRY_POINT_GROUP, name=engine):
         return entry.value
-    raise LookupError(f"no installed package has it among its {GROUP}; install this one anew")
+    raise LookupError(
+        f"no installed package has it among its {ENTRY_POINT_GROUP}; install this one anew"
+    )

@@ -29,7 +29,7 @@ from sling2sim2real.simulator.model import ClampedBand
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-LOCK = threading.Lock()  # while a filter is made, which takes a second
+FILTER_LOCK = threading.Lock()  # while a filter is made, which takes a second
 
 
 class EpisodeLoss:
@@ -158,7 +158,7 @@ class EpisodeLoss:
     def _filter(self, times: np.ndarray) -> csr_array:
         """Filter of forces at simulated times (S,), as the recorded force was filtered."""
         start = float(self.time[0] - self.period / 2)
-        with LOCK:
+        with FILTER_LOCK:
             return _recording_filter(
                 times.tobytes(), self.cutoff, start, self.period, len(self.time)
             )

@@ -9,7 +9,7 @@ import numpy as np
 
 from sling2sim2real.identification.posterior.residuals import Residuals
 
-UNLIKE = 0.05  # an autocorrelation that is none
+NO_AUTOCORRELATION = 0.05  # an autocorrelation that is none
 
 
 @dataclass(frozen=True)
@@ -163,16 +163,17 @@ class Expansion:
 
     @property
     def recoil_discrepancy(self) -> float:
-        """The same of the recoil, as a share of the way gone; that of the picture where it is most.
+        """The same of the recoil, as a share of how far the middle has travelled.
 
+        That of the picture where it is most.
         What a law gets wrong of a recoil moves all of a picture's points together.
         """
         seen, bins = self.form.residuals, self._bins
-        gone = seen.gone()
+        travelled = seen.travelled()
         pictures = [seen.picture == picture for picture in np.unique(seen.picture[seen.recoils])]
         return max(
             (
-                _repeated(bins[axis, picture]) / gone[picture][0]
+                _repeated(bins[axis, picture]) / travelled[picture][0]
                 for picture in pictures
                 for axis in (0, 1)
             ),
@@ -193,6 +194,6 @@ def _repeated(left: np.ndarray) -> float:
     if not size:
         return 0.0
     alike = np.correlate(left, left, "full")[len(left) :] / size
-    ends = np.flatnonzero(alike < UNLIKE)
+    ends = np.flatnonzero(alike < NO_AUTOCORRELATION)
     time = 1 + 2 * alike[: ends[0] if len(ends) else len(alike)].sum()
     return float(np.sqrt(size / len(left) * time))

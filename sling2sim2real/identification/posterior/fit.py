@@ -29,13 +29,15 @@ from sling2sim2real.identification.posterior.likelihood import SIMULATED, Failed
 
 PASSES = 4  # at most
 ITERATIONS = 30  # of a pass, at most
-LONGEST = 20.0  # of a step, in those of the finite differences
-STILL = 0.1  # of a last step, in standard deviations: no interval is 1 % wider by as much
-FLAT = 0.2  # of -2 log p: so little that a step which changes it by less tells nothing apart
-NEAR = 1.0  # standard deviations that such a step may go
-LEAST = 1e-6  # of a column's length, where nothing tells a coordinate
-DAMP, HARDER, EASIER, HARDEST = 1e-3, 10.0, 0.05, 1e4  # Levenberg's, relative to the diagonal
-HALF = 1.0  # at least, after a step that went wrong: it halves the next one
+LONGEST_STEP = 20.0  # of a step, in those of the finite differences
+SETTLED_SIZE = 0.1  # of a last step, in standard deviations: no interval is 1 % wider by as much
+# Of -2 log p: so little that a step which changes it by less tells nothing apart.
+NEGLIGIBLE_MISFIT = 0.2
+NEGLIGIBLE_SIZE = 1.0  # standard deviations that such a step may go
+LEAST_SLOPE = 1e-6  # of a column's length, where nothing tells a coordinate
+FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e4  # Levenberg's, relative to the diagonal
+DAMPING_RAISED, DAMPING_LOWERED = 10.0, 0.05  # by these factors
+DAMPING_AFTER_FAILURE = 1.0  # at least, after a step that went wrong: it halves the next one
 
 
 class NoFit(UserError):
@@ -132,7 +134,9 @@ def fit(
                 ) from None
             progress(begun)
             best, still = _descended(begun, coordinates, expanded, progress)
-            settled = still and best.size(best.phi - begun.phi) < STILL and _same(best, begun)
+            settled = (
+                still and best.size(best.phi - begun.phi) < SETTLED_SIZE and _same(best, begun)
+            )
             phi, nuisances = best.phi, best.nuisances
             if settled:
                 break
@@ -147,10 +151,10 @@ def _descended(
     progress: Callable[[Fit], None],
 ) -> tuple[Fit, bool]:
     """Where a pass ends, and whether any further step would be small, hardly damped."""
-    best, damp, count = begun, DAMP, len(begun.phi)
+    best, damp, count = begun, FIRST_DAMPING, len(begun.phi)
     for _ in range(ITERATIONS):
         # Damping makes any step short, also where the fit is stuck.
-        if best.size(_step(best, coordinates, min(damp, DAMP))[:count]) < STILL:
+        if best.size(_step(best, coordinates, min(damp, FIRST_DAMPING))[:count]) < SETTLED_SIZE:
             return best, True
         step = _step(best, coordinates, damp)
         nuisances = best.nuisances + step[count:].reshape(best.nuisances.shape)
@@ -160,26 +164,26 @@ def _descended(
             trial = None
         misfit = best.misfit_of(trial) if trial else np.inf
         if trial and misfit < best.misfit:
-            best, damp = trial, damp * EASIER
+            best, damp = trial, damp * DAMPING_LOWERED
             progress(best)
             continue
-        if misfit < best.misfit + FLAT and best.size(step[:count]) < NEAR:
+        if misfit < best.misfit + NEGLIGIBLE_MISFIT and best.size(step[:count]) < NEGLIGIBLE_SIZE:
             return best, True
-        damp = max(damp * HARDER, HALF)
-        if damp > HARDEST:
+        damp = max(damp * DAMPING_RAISED, DAMPING_AFTER_FAILURE)
+        if damp > MOST_DAMPING:
             break
     return best, False
 
 
 def _step(at: Fit, coordinates: Coordinates, damp: float) -> np.ndarray:
-    """Least of |r + J d|^2, damped, within the bounds and LONGEST, shape (D + 3 N,)."""
+    """Least of |r + J d|^2, damped, within the bounds and LONGEST_STEP, shape (D + 3 N,)."""
     count, unknowns = len(at.phi), at.slopes.shape[1]
-    size = np.maximum(np.linalg.norm(at.slopes, axis=0), LEAST)
+    size = np.maximum(np.linalg.norm(at.slopes, axis=0), LEAST_SLOPE)
     design = np.vstack([at.slopes / size, np.sqrt(damp) * np.eye(unknowns)])
     basis, triangle = np.linalg.qr(design)
     aim = -basis[: len(at.left)].T @ at.left
     low, high = np.full((2, unknowns), [[-np.inf], [np.inf]])
-    longest = LONGEST * coordinates.steps
+    longest = LONGEST_STEP * coordinates.steps
     low[:count] = np.maximum(coordinates.low - at.phi, -longest)
     high[:count] = np.minimum(coordinates.high - at.phi, longest)
     ends = low * size - 1e-12, high * size + 1e-12

@@ -15,9 +15,9 @@ import numpy as np
 from sling2sim2real.base.parameters import TABLE, Parameter
 from sling2sim2real.identification.posterior.coordinates import DAMPING
 
-HALF_NORMAL = 1 - 2 / np.pi  # its variance, of a normal's
-EVEN = 1 / 12  # of a range
-LEAST = 1e-9  # of a column that the samples vary
+HALF_NORMAL_VARIANCE = 1 - 2 / np.pi  # its variance, of a normal's
+EVEN_VARIANCE = 1 / 12  # of a range
+LEAST_RANGE = 1e-9  # of a column that the samples vary
 
 
 @dataclass(frozen=True)
@@ -120,9 +120,9 @@ class LandingModel:
                 direction[self.names.index("youngs_modulus")] = 0.5
             if row.coordinate.prior:
                 variance = row.coordinate.prior[1] ** 2
-                variance *= HALF_NORMAL if row.coordinate.half else 1.0
+                variance *= HALF_NORMAL_VARIANCE if row.coordinate.half else 1.0
             elif row.coordinate.bounds:
-                variance = EVEN * np.ptp(row.coordinate.bounds) ** 2
+                variance = EVEN_VARIANCE * np.ptp(row.coordinate.bounds) ** 2
             else:  # within a method's box
                 continue
             precision += np.outer(direction, direction) / variance
@@ -135,6 +135,6 @@ def unknowns(names: Sequence[str], samples: np.ndarray) -> dict[str, np.ndarray]
     for name, column in zip(names, samples.T, strict=True):
         coordinate = rows[name].coordinate
         column = np.log(column) if coordinate and coordinate.log else column
-        if len(column) and np.ptp(column) > LEAST:
+        if len(column) and np.ptp(column) > LEAST_RANGE:
             columns[name] = column
     return columns

@@ -37,8 +37,8 @@ from sling2sim2real.simulator.rubber import RUBBER
 
 LEVEL = 0.9
 SI_UNITS = {row.name: row.si for row in TABLE}
-WIDER = 1.2  # times the usual spread: less changes no interval by much
-FILLS = 2 / 3  # of the prior's interval: one as wide tells nothing
+WORTH_WIDENING = 1.2  # times the usual spread: less changes no interval by much
+IDENTIFIABLE_SHARE = 2 / 3  # of the prior's interval: one as wide tells nothing
 
 
 @dataclass(frozen=True)
@@ -131,9 +131,9 @@ def fit_posterior(
         for recording, it in zip(recordings, fitted.expansions, strict=True)
     ]
     if any(
-        getattr(wide.tolerances, what) > WIDER * getattr(recording.tolerances, what)
+        getattr(wide.tolerances, what) > WORTH_WIDENING * getattr(recording.tolerances, what)
         for recording, wide in zip(recordings, follows, strict=True)
-        for what in ("force", "way")
+        for what in ("force", "recoil")
     ):
         recordings, first = follows, fitted
         fitted = fit(recordings, coordinates, first.phi, **options)
@@ -193,8 +193,8 @@ def theta_entries(identified: Identified) -> dict:
 def confidence(identified: Identified) -> dict:
     """What a θ file says under `confidence`, ready for JSON.
 
-    A parameter is identifiable if its interval is less than FILLS of its prior's, as the
-    coordinate that shows it has them.
+    A parameter is identifiable if its interval is less than IDENTIFIABLE_SHARE of its prior's, as
+    the coordinate that shows it has them.
     """
     samples, mode, parameters = identified.parameters, identified.mode.sample(), {}
     columns = {name: samples.column(name) for name in samples.names}
@@ -250,7 +250,7 @@ def _priors(identified: Identified) -> dict[str, dict]:
             values = at.column("elasticity_damping") * at.column("damping_scale")
         else:
             values = at.column(name)
-        summary = bool(widths[axis] < FILLS * np.ptp(ends[:, axis]))
+        summary = bool(widths[axis] < IDENTIFIABLE_SHARE * np.ptp(ends[:, axis]))
         result[name] = {"prior": values.tolist(), "identifiable": summary}
     return result
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.launch_table import DRAW, LANDING, metres
+from sling2sim2real.base.launches_file import COLUMNS, metres
 from sling2sim2real.simulator.launch import landing_gradient, launch
 from sling2sim2real.simulator.model import ClampedBand, LaunchSetup
 from sling2sim2real.simulator.parameters import Parameters
@@ -35,10 +34,9 @@ class Observed:
     landing: float
 
     def __post_init__(self) -> None:
-        for name, value in zip((*DRAW, LANDING), (*self.draw, self.landing), strict=True):
-            metres("launch", name, str(value))
-        if self.error is not None and not 0 <= self.error < 1:
-            raise UserError(f"error: must be from 0 to 1 m, got {self.error}")
+        values = *self.draw, self.error, self.landing
+        for name, value in zip(COLUMNS[:4], values, strict=True):
+            metres("launch", name, "" if value is None else str(value))
 
 
 @dataclass(frozen=True)

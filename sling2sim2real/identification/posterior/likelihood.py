@@ -29,8 +29,8 @@ from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
 
 SIMULATED = "release", "camera", "hand"
-RELEASE_ERROR = 3e-5  # s: of the release, where the clocks are known by it
-NUDGE = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
+RELEASE_ERROR_S = 3e-5  # s: of the release, where the clocks are known by it
+NUISANCE_STEPS = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,8 @@ class Tolerances:
     Attributes:
         force: Of a sample of the force [N]. Its low-pass repeats a sample's error in some 14, and
             so does what the law gets wrong of the pull: 30 mN each are worth 30 sqrt(14) alone.
-        cloud, way: Of a bin of a picture [m], and of the recoil as a share of the way gone.
+        cloud, recoil: Of a bin of a picture [m], and of the recoil as a share of how far the middle
+            has travelled.
         release, camera: Of the release and of the camera's clock against the force's [s]. A camera
             whose clock is known by the release has all of it.
         hand: Of the hand's place along the pull [m].
@@ -53,7 +54,7 @@ class Tolerances:
 
     force: float = 0.11
     cloud: float = 1.0e-3
-    way: float = 0.02
+    recoil: float = 0.02
     release: float = 3e-4
     camera: float = 1e-3
     hand: float = 1e-5
@@ -77,7 +78,7 @@ class Tolerances:
             given["camera"] = np.hypot(given["camera"], given["pose"] or 0.0)
             if clocks["pose"].get("against") == "release":  # and so is the camera's, by the pose
                 given["pose"] = np.hypot(given["pose"] or 0.0, given["release"] or 0.0)
-                given["release"] = RELEASE_ERROR
+                given["release"] = RELEASE_ERROR_S
         return cls(**{name: float(value) for name, value in given.items() if value})
 
     @property
@@ -95,8 +96,8 @@ def opening_time(episode: Episode, sling: ClampedBand, friction: float) -> float
     fall = episode.metadata.get("preprocessing", {}).get("release_fall")
     if not fall:
         return sling.finger_opening_time
-    late = np.flatnonzero(episode.time < episode.release_time)[-20:]
-    held = np.linalg.norm(episode.force[late], axis=1).max()
+    last = np.flatnonzero(episode.time < episode.release_time)[-20:]
+    held = np.linalg.norm(episode.force[last], axis=1).max()
     return float(np.clip(fall * 2 * friction * sling.grip_force / held, 5e-4, 0.05))
 
 
@@ -154,8 +155,8 @@ class Likelihood:
         """
         wider = copy(self)
         force = max(self.tolerances.force, expansion.discrepancy)
-        way = max(self.tolerances.way, expansion.recoil_discrepancy)
-        wider.tolerances = replace(self.tolerances, force=force, way=way)
+        recoil = max(self.tolerances.recoil, expansion.recoil_discrepancy)
+        wider.tolerances = replace(self.tolerances, force=force, recoil=recoil)
         return wider
 
     def shifted(self, nuisances: np.ndarray) -> Episode:
@@ -172,14 +173,14 @@ class Likelihood:
         )
 
     def simulate(
-        self, parameters: Parameters, nuisances: np.ndarray, late: Sequence[float] = (0.0,)
+        self, parameters: Parameters, nuisances: np.ndarray, delays: Sequence[float] = (0.0,)
     ) -> list[Rollouts]:
-        """Rollouts of N parameters, as pictures show them that are so late [s]. Raises Failed.
+        """Rollouts of N parameters, as pictures show them that are delayed [s]. Raises Failed.
 
         They end with the last picture that counts.
         """
         episode = self.shifted(nuisances)
-        stamps = [episode.cloud_time + delay for delay in late]
+        stamps = [episode.cloud_time + delay for delay in delays]
         every, places = np.unique(np.concatenate(stamps), return_inverse=True)
         seen = replace(episode, cloud_time=every)
         done = interact(self.sling, seen, parameters, until=max(every, default=np.inf))
@@ -208,9 +209,9 @@ class Likelihood:
             form: None: that of the rollout there.
         """
         around = parameters_of(phi + np.vstack([0 * steps, np.diag(steps)]))
-        release, _, hand = np.diag(NUDGE)
+        release, _, hand = np.diag(NUISANCE_STEPS)
         jobs = [
-            (around, nuisances, (0.0, NUDGE[1])),
+            (around, nuisances, (0.0, NUISANCE_STEPS[1])),
             (around[:1], nuisances + release),
             (around[:1], nuisances + hand),
         ]
@@ -220,7 +221,7 @@ class Likelihood:
         here, *others = residuals(first)
         moved = np.concatenate([residuals(rollouts) for rollouts in (released, later, led)])
         slopes = (np.array(others) - here) / steps[:, None]
-        nuisance_slopes = (moved - here) / NUDGE[:, None]
+        nuisance_slopes = (moved - here) / NUISANCE_STEPS[:, None]
         form = form or self._form(residuals, here, nuisance_slopes[SIMULATED.index("camera")])
         # The force tells nothing of the loss factor, the recoil does: a law that lacks slow
         # hysteresis would take the one for the other.
@@ -276,10 +277,10 @@ class Likelihood:
         """The density's form by residuals (R,) and how the camera's clock changes them, (R,)."""
         has, changes = self.tolerances, residuals.columns(here)
         sizes = {"force_bias": has.bias, "force_drift": has.drift}
-        sizes |= {"force_gain": has.gain, "force_late": has.pose}
+        sizes |= {"force_gain": has.gain, "force_delay": has.pose}
         sizes |= {"cloud_shift": has.shift, "cloud_turn": has.turn}
         columns = [sizes[re.sub("_[xyz]$", "", name)] * change for name, change in changes.items()]
         for picture in np.unique(residuals.picture[residuals.recoils]):
             columns.append(has.jitter * np.where(residuals.of_picture(picture), camera, 0.0))
-        weight = 1 / residuals.spread(has.force, has.cloud, has.way)
+        weight = 1 / residuals.spread(has.force, has.cloud, has.recoil)
         return Form.of(residuals, weight, np.array(columns))

@@ -26,8 +26,8 @@ from sling2sim2real.simulator.replay import recorded_force
 BINS = 16  # along the band, equal at rest
 LEAST_POINTS = 4  # of a bin
 MOST_POINTS = 320  # of a picture that are looked at
-WINDOW = 4  # edges on each side of a bin's own on which its point's foot may lie
-VISIBLE = 2 / np.pi  # mean of cos over the half of a tube that faces the camera
+EDGES_BESIDE = 4  # edges on each side of a bin's own on which its point's foot may lie
+MEAN_VISIBLE_COSINE = 2 / np.pi  # mean of cos over the half of a tube that faces the camera
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class Rule:
             picture, the more of what a law gets wrong has added up.
         latest: Where there is none, the first one until then: later ones show a slack band that
             swings about.
-        way: Share of the draw by which the band must still be behind the fork in those; where it is
-            in none, the first one counts.
+        least_share: Of the draw by which the band must still be behind the fork in those; where it
+            is in none, the first one counts.
         bins: Of the recoil, first and end: nearer the clamps the band folds.
     """
 
@@ -50,7 +50,7 @@ class Rule:
     held: tuple[float, float] = (-0.5, -0.02)
     recoil: float = 0.034
     latest: float = 0.05
-    way: float = 0.15
+    least_share: float = 0.15
     bins: tuple[int, int] = (4, 12)
 
     def pictures(self, episode: Episode) -> np.ndarray:
@@ -58,16 +58,16 @@ class Rule:
         time = episode.cloud_time - episode.release_time
         held = (time > self.held[0]) & (time < self.held[1])
         hand = episode.position[episode.time <= episode.release_time][-1:]
-        drawn = self.behind(hand)
+        drawn = self.behind_fork(hand)
         after = np.flatnonzero((time > 0) & (time <= self.latest))
         first = after[np.argsort(time[after])[:1]]
         early = after[time[after] <= self.recoil]
-        far = [k for k in early if self.behind(episode.clouds[k]) > self.way * drawn]
+        far = [k for k in early if self.behind_fork(episode.clouds[k]) > self.least_share * drawn]
         recoil = far or first.tolist()
         return np.union1d(np.flatnonzero(held), recoil).astype(int)
 
     @staticmethod
-    def behind(points: np.ndarray) -> float:
+    def behind_fork(points: np.ndarray) -> float:
         """How far the farthest twentieth of points (P, 3) is behind the fork [m]."""
         return -float(np.quantile(points[:, 1], 0.05)) if len(points) else 0.0
 
@@ -135,7 +135,7 @@ class Residuals:
             tangent = step / length[:, None]
             radius = self.sling.radius * np.sqrt(self._edges / length)
             front = _across(episode.camera - foot, tangent[edge])
-            offset = points - foot - VISIBLE * radius[edge, None] * front
+            offset = points - foot - MEAN_VISIBLE_COSINE * radius[edge, None] * front
             foot_of_mean, edge_of_mean, _ = nearest(mean, line)
             along = tangent[edge_of_mean]
             depth = _across(episode.camera - mean, along)
@@ -156,7 +156,7 @@ class Residuals:
             np.concatenate(column) for column in columns
         )
         self._bias = np.stack([_dot(bias, self.depth), _dot(bias, self.side)])  # (2, M)
-        window = edge[:, None] + np.arange(-WINDOW, WINDOW + 1)
+        window = edge[:, None] + np.arange(-EDGES_BESIDE, EDGES_BESIDE + 1)
         self._window = np.clip(window, 0, len(self._edges) - 1)
 
     def __call__(self, rollouts: Rollouts) -> np.ndarray:
@@ -175,18 +175,18 @@ class Residuals:
         cloud = [_dot(offset, self.depth) - self._bias[0], _dot(offset, self.side) - self._bias[1]]
         return np.concatenate([*gap.transpose(2, 0, 1), *cloud], axis=1).astype(float)
 
-    def spread(self, force: float, cloud: float, way: float) -> np.ndarray:
+    def spread(self, force: float, cloud: float, recoil: float) -> np.ndarray:
         """Standard deviation of each residual, shape (R,).
 
         Args:
             force: Of a sample [N].
-            cloud, way: Of a bin [m], and as a share of the way that the middle has gone.
+            cloud, recoil: Of a bin [m], and as a share of how far the middle has travelled.
         """
-        bins = np.hypot(cloud, way * np.where(self.recoils, self.gone(), 0.0))
+        bins = np.hypot(cloud, recoil * np.where(self.recoils, self.travelled(), 0.0))
         return np.concatenate([np.full(3 * len(self.samples), force), bins, bins])
 
-    def gone(self) -> np.ndarray:
-        """Way of the band's middle from where it was drawn, as each bin saw it [m], shape (M,).
+    def travelled(self) -> np.ndarray:
+        """How far the band's middle is from where it was drawn, as each bin saw it [m], shape (M,).
 
         Where no picture of the drawn band counts, the hand at the release says it.
         """
@@ -201,8 +201,8 @@ class Residuals:
         """How the residuals change with what moves all measured forces or points alike, (R,) each.
 
         force_bias_* [N], force_drift_* [N over the pull], force_gain: a share of the force,
-        force_late: the force's stamps against the pose's [s], cloud_shift_* [m], cloud_turn_* about
-        the camera [rad].
+        force_delay: the force's stamps against the pose's [s], cloud_shift_* [m], cloud_turn_*
+        about the camera [rad].
 
         Args:
             left: Residuals (R,) of the rollout whose force a gain or a delay is of. With the
@@ -212,7 +212,7 @@ class Residuals:
         time = self.episode.time[self.samples]
         since = (time - time[0]) / (time[-1] - time[0])
         force = self.episode.force[self.samples] - left[: 3 * count].reshape(3, count).T
-        for name, course in (("late", np.gradient(force, time, axis=0)), ("gain", force)):
+        for name, course in (("delay", np.gradient(force, time, axis=0)), ("gain", force)):
             changes[f"force_{name}"] = np.append(course.T.ravel(), np.zeros(2 * len(self.picture)))
         arm = self.point - self.episode.camera
         turned = np.cross(arm, self.depth), np.cross(arm, self.side)

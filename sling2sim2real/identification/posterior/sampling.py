@@ -18,20 +18,22 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import RandomState  # emcee's
+from scipy.special import ndtr, ndtri
 
 from sling2sim2real.identification.posterior.coordinates import LOSS, Coordinates
-from sling2sim2real.identification.posterior.draws import truncated_gaussian
 from sling2sim2real.identification.posterior.fit import Fit, widened
 from sling2sim2real.identification.posterior.launches import LaunchLikelihood
 from sling2sim2real.identification.posterior.likelihood import Likelihood
 
 SAMPLES = 200  # of a batch, and of the density
 BATCHES = 5  # at most
-ENOUGH = SAMPLES / 2  # effective ones
-WIDER = 1.2  # than the Gaussian at the mode, of the first batch: its tails are seen too
-TEMPER = 0.3  # power of the density, by which a rollout counts for the surface
-RIDGE = 1e-2  # of the terms of second order
-STEPS = 300  # of the chains, which start at the last batch: some six autocorrelation times
+ENOUGH_EFFECTIVE = SAMPLES / 2  # effective ones
+PROPOSAL_WIDTH = 1.2  # than the Gaussian at the mode, of the first batch: its tails are seen too
+SURFACE_TEMPER = 0.3  # power of the density, by which a rollout counts for the surface
+SURFACE_RIDGE = 1e-2  # of the terms of second order
+CHAIN_STEPS = 300  # of the chains, which start at the last batch: some six autocorrelation times
+GIBBS_SWEEPS = 250  # of chains that begin at the centre
+TAIL_END = 8.0  # standard deviations, where a tail has no numbers left
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def log_density(
 
 
 def samples_around(density: Fit, coordinates: Coordinates, rng: np.random.Generator) -> np.ndarray:
-    """SAMPLES of a Gaussian around a mode, WIDER than the density there and within bounds.
+    """SAMPLES of a Gaussian around a mode, PROPOSAL_WIDTH times as wide, within bounds.
 
     Args:
         density: As `widened` gives it.
@@ -89,7 +91,41 @@ def samples_around(density: Fit, coordinates: Coordinates, rng: np.random.Genera
     """
     box = coordinates.low, coordinates.high
     centre = density.phi + np.linalg.solve(density.hessian, density.gradient)
-    return truncated_gaussian(centre, density.hessian / WIDER**2, *box, SAMPLES, rng)
+    return truncated_gaussian(centre, density.hessian / PROPOSAL_WIDTH**2, *box, SAMPLES, rng)
+
+
+def truncated_gaussian(
+    centre: np.ndarray,
+    precision: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    count: int,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """Samples (count, D) of the density exp(-(x - centre)' precision (x - centre) / 2) in a box.
+
+    By Gibbs: each coordinate given the others, cut off (Robert, Stat. Comput. 5, 1995).
+
+    Args:
+        centre: Maximum of the unbounded Gaussian (D,), which may lie outside the box.
+        precision: Positive definite, (D, D).
+    """
+    spread = 1 / np.sqrt(np.diag(precision))
+    chains = np.tile(np.clip(centre, low, high), (count, 1))
+    for _ in range(GIBBS_SWEEPS):
+        for axis, deviation in enumerate(spread):
+            pull = (chains - centre) @ precision[axis] - precision[axis, axis] * (
+                chains[:, axis] - centre[axis]
+            )
+            mean = centre[axis] - pull * deviation**2
+            ends = [
+                ((end[axis] - mean) / deviation).clip(-TAIL_END, TAIL_END) for end in (low, high)
+            ]
+            below, above = map(ndtr, ends)
+            part = below + rng.random(count) * (above - below)
+            tail = np.where(above > below, ndtri(np.clip(part, 1e-16, 1 - 1e-16)), ends[0])
+            chains[:, axis] = np.clip(mean + deviation * tail, low[axis], high[axis])
+    return chains
 
 
 @dataclass(frozen=True)
@@ -116,7 +152,7 @@ class QuadraticSurface:
     ) -> QuadraticSurface:
         """Fit residuals `left` (N, R) at coordinates (N, D), each of a weight, by least squares."""
         terms = _terms((phi - centre) / scale)
-        ridge = np.where(np.arange(terms.shape[1]) > len(centre), RIDGE, 1e-9)
+        ridge = np.where(np.arange(terms.shape[1]) > len(centre), SURFACE_RIDGE, 1e-9)
         weighted = terms.T * weight
         coefficients = np.linalg.solve(weighted @ terms + np.diag(ridge), weighted @ left)
         return cls(centre, scale, coefficients @ coefficients.T)
@@ -158,7 +194,7 @@ def samples_of(remaining: Remaining, widening: float, seed: int) -> tuple[np.nda
             exact = log(batch, np.sum(seen**2, axis=1))
             weighed = _resampled(batch, exact - log(batch, surface.misfit(batch)), random)
             best = max(best, weighed, key=lambda it: it[1])
-            if best[1] > ENOUGH:
+            if best[1] > ENOUGH_EFFECTIVE:
                 break
         phi = np.concatenate([phi, batch])
         left = seen if left is None else np.concatenate([left, seen])
@@ -166,7 +202,7 @@ def samples_of(remaining: Remaining, widening: float, seed: int) -> tuple[np.nda
         if not good.any():
             break
         logs = log(phi[good], np.sum(left[good] ** 2, axis=1))
-        weight = np.exp(TEMPER * (logs - logs.max()))
+        weight = np.exp(SURFACE_TEMPER * (logs - logs.max()))
         surface = QuadraticSurface.fitted(density.phi, scale, phi[good], left[good], weight)
         batch = _evolved(lambda at, by=surface: log(at, by.misfit(at)), batch, random)
     return *best, count
@@ -193,7 +229,7 @@ def _evolved(
     start: np.ndarray,
     random: RandomState,
 ) -> np.ndarray:
-    """Ends (N, D) of chains from `start` (N, D) after STEPS, by differential evolution."""
+    """Ends (N, D) of chains from `start` (N, D) after CHAIN_STEPS, by differential evolution."""
     import emcee
 
     # Its snooker move, as of 3.1.6, samples a normal density 7 to 23 % too narrow.
@@ -201,6 +237,6 @@ def _evolved(
     move = emcee.moves.DEMove()
     chains = emcee.EnsembleSampler(count, axes, log, vectorize=True, moves=move)
     chains.random_state = random.get_state()
-    chains.run_mcmc(start, STEPS, skip_initial_state_check=True)
+    chains.run_mcmc(start, CHAIN_STEPS, skip_initial_state_check=True)
     random.set_state(chains.random_state)
     return np.asarray(chains.get_last_sample().coords)

@@ -12,7 +12,8 @@ from sling2sim2real.identification.objective.box import latin_hypercube
 if TYPE_CHECKING:
     from sling2sim2real.identification.search import Evaluate
 
-RISE = 0.1  # of an edge: no derivative counts for more than the first batch's median rise over it
+# Of an edge: no derivative counts for more than the first batch's median rise over it.
+STEEPEST_RISE_EDGE = 0.1
 
 
 def adam(
@@ -55,7 +56,7 @@ def adam(
     order = np.argsort(losses, kind="stable")[:starts]
     at = [torch.tensor(points[row], requires_grad=True) for row in order]
     best = [(losses[row], x.detach().clone()) for row, x in zip(order, at, strict=True)]
-    worst, steepest = losses.max(), (np.median(losses) - losses.min()) / RISE
+    worst, steepest = losses.max(), (np.median(losses) - losses.min()) / STEEPEST_RISE_EDGE
     optimizer = torch.optim.Adam([{"params": [x], "share": 1.0} for x in at], lr=rate)
     solver, done = np.repeat(np.arange(starts), dimension + 1), 0
     while True:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 FIT_STEPS = 10  # of L-BFGS on the hyperparameters, which start where the last round's ended
 CANDIDATES = 512  # from which a batch is put together, half of them near the best points
-NEAR = 10  # how many best points
-SAMPLES = 128  # of the posterior, quasi-random
+BEST_POINTS = 10  # how many best points
+POSTERIOR_SAMPLES = 128  # of the posterior, quasi-random
 POLISH_STEPS = 20  # of L-BFGS on the whole batch
 
 
@@ -90,7 +90,7 @@ class Process:
             model, best = self._fitted(unit, value), value.max()
             candidates = _candidates(unit[np.argsort(-value, kind="stable")], seed)
             first, second = (
-                SobolQMCNormalSampler(torch.Size([SAMPLES]), seed=int(number))
+                SobolQMCNormalSampler(torch.Size([POSTERIOR_SAMPLES]), seed=int(number))
                 for number in np.random.default_rng([*seed, 1]).integers(2**31, size=2)
             )
             with torch.no_grad():
@@ -130,7 +130,7 @@ def _candidates(best: np.ndarray, seed: list[int]) -> np.ndarray:
     dimension, half = best.shape[1], CANDIDATES // 2
     everywhere = qmc.Sobol(dimension, rng=rng).random(half)
     scale = 10 ** rng.uniform(-2.3, -0.3, (half, 1))
-    centre = best[rng.integers(min(NEAR, len(best)), size=half)]
+    centre = best[rng.integers(min(BEST_POINTS, len(best)), size=half)]
     return np.concatenate([everywhere, reflect(centre + scale * rng.normal(size=centre.shape))])
 
 

@@ -18,7 +18,7 @@ from sling2sim2real.base.files import write_json
 from sling2sim2real.base.schema import JsonRecord, Name, read_json, refusal
 from sling2sim2real.settings.identification import MethodParams, OptimizerParams
 
-RIDGE = 1e-3  # of the mean variance, added to every variance
+COVARIANCE_RIDGE = 1e-3  # of the mean variance, added to every variance
 LEAST_VARIANCE = 1e-6  # a thousandth of the box, where all neighbours are one point
 
 
@@ -115,7 +115,7 @@ def regularised(covariance: np.ndarray) -> np.ndarray:
     """Covariance (D, D) with a ridge, so that its Cholesky factor exists."""
     covariance = np.atleast_2d(covariance)
     dimension = len(covariance)
-    ridge = max(RIDGE * np.trace(covariance) / dimension, LEAST_VARIANCE)
+    ridge = max(COVARIANCE_RIDGE * np.trace(covariance) / dimension, LEAST_VARIANCE)
     return covariance + ridge * np.eye(dimension)
 
 

@@ -55,13 +55,29 @@ class Stored:
 
     Attributes:
         folder: Where its files lie, or would.
+        card_name: Of the file beside the network that says what it is (policy/export.py).
     """
 
     folder: Path
+    card_name: str = "card.json"
+
+    @classmethod
+    def of_band(cls, folder: Path) -> Stored:
+        """That in a band's folder (api/band_folder.py)."""
+        return cls(folder, "policy.json")
+
+    @property
+    def network(self) -> Path:
+        """policy.onnx, metres to metres."""
+        return self.folder / "policy.onnx"
+
+    @property
+    def card_file(self) -> Path:
+        return self.folder / self.card_name
 
     def card(self) -> dict:
         """What its card says (export.card). Raises NotMade: missing, or damaged."""
-        return read_json(made(self.folder / "card.json"), Card).model_dump()
+        return read_json(made(self.card_file), Card).model_dump()
 
     def draws(self, targets: np.ndarray) -> np.ndarray:
         """Draws (y, z) [m], shape (N, 2), for targets [m], (N,).
@@ -71,7 +87,7 @@ class Stored:
         """
         import onnxruntime
 
-        path = made(self.folder / "policy.onnx")
+        path = made(self.network)
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         options.log_severity_level = 4  # what is wrong is said below
@@ -93,5 +109,5 @@ class Stored:
         """Where the projectile starts (y, z) [m], as the policy was trained with."""
         projectile = self.card()["projectile"]
         if projectile is None:
-            raise NotMade(self.folder / "card.json", "lacks the policy's input `projectile`")
+            raise NotMade(self.card_file, "lacks the policy's input `projectile`")
         return projectile["trained_at"]

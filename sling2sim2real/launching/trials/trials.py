@@ -15,8 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from sling2sim2real.base.files import replacing
+from sling2sim2real.base.launches_file import CHECK, LaunchRow
 from sling2sim2real.base.pool import Pool
-from sling2sim2real.launching.launches_file import CHECK, LaunchRow
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.spread import landing_intervals
 from sling2sim2real.settings import Settings

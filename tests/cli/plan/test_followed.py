@@ -1,6 +1,5 @@
 """A robot that follows a plan makes a good recording, which tells the next plan its force."""
 
-import shutil
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.params import load
+from sling2sim2real import Band
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.plan.force import read_earlier
 from sling2sim2real.cli.plan.plan import plan_recording
 from sling2sim2real.cli.plan.trajectory import Trajectory
+from sling2sim2real.cli.preflight.check import GivenBand, look_at
 from tests.project import DEFAULTS, with_
 from validation.recordings.bag import BASE, HAND, REST, Truth, write_bag
 
@@ -49,6 +50,7 @@ class Repeated(Followed):
 
 pytestmark = pytest.mark.usefixtures("nowhere")
 
+BAND = Band(mass=0.023, diameter=0.010, rest_length=0.52, name="band1")
 FAST = {"max_speed": 0.8, "pull_speed": 0.5, "max_acceleration": 5.0, "hanging": 0.195}
 FAST |= {"lead_in": 0.6, "finger_time": 0.3, "pause": 0.8, "wait": 0.5}
 
@@ -61,7 +63,7 @@ def recorded(tmp_path_factory):
     whole = load(DEFAULTS)
     placed = with_(whole, "setup", base_to_fork=tuple(map(float, fork_in_base)))
     params = with_(with_(placed, "plan", **FAST), "episode", duration=4.2, samples=140, tail=0.5)
-    plan = plan_recording(params, "band1")
+    plan = plan_recording(params, BAND)
     way, release = plan.trajectory, plan.trajectory.start_of("release") + 3e-4
     truth = Followed(
         grasp=way.start_of("lift"), release=release, end=way.duration, draw=0.4, way=way
@@ -72,13 +74,11 @@ def recorded(tmp_path_factory):
 
 
 def test_a_robot_that_follows_the_plan_makes_a_recording_that_check_accepts(recorded) -> None:
-    from sling2sim2real.cli.preflight.check import band_of, look_at
-
     path, plan, params, truth = recorded
     np.testing.assert_allclose(
         Rotation.from_quat(plan.hand).as_matrix(), (BASE[0].inv() * HAND).as_matrix(), atol=1e-9
     )
-    report = look_at(path, params, band_of(params)).report
+    report = look_at(path, params, GivenBand.of({}, params.setup)).report
     assert report.usable, report.problem
     assert report.signals.release_s == pytest.approx(truth.release, abs=1e-3)
     assert report.signals.draw_m == pytest.approx([0, -0.4, 0], abs=1e-3)
@@ -86,36 +86,34 @@ def test_a_robot_that_follows_the_plan_makes_a_recording_that_check_accepts(reco
 
 @pytest.mark.slow
 def test_a_robot_that_pulls_twice_makes_two_recordings_in_one_file(recorded, tmp_path) -> None:
-    from sling2sim2real.cli.preflight.check import band_of, look_at
-
-    plan = plan_recording(recorded[2], "band1", pulls=2)
+    plan = plan_recording(recorded[2], BAND, pulls=2)
     way, path = plan.trajectory, tmp_path / "twice.mcap"
     begins = list(zip([phase.name for phase in way.phases], way.times, strict=False))
     grasps = [time for name, time in begins if name == "lift"]
     releases = [time + 3e-4 for name, time in begins if name == "release"]
     moments = tuple(zip(grasps, releases, strict=True))
     write_bag(path, Repeated(end=way.duration, draw=0.4, way=way, moments=moments))
-    report = look_at(path, recorded[2], band_of(recorded[2]), pull=2).report
+    report = look_at(path, recorded[2], GivenBand.of({}, recorded[2].setup), pull=2).report
     assert plan.content()["pulls"] == len(report.pulls) == 2
     assert all(pull.usable for pull in report.pulls), str(report.pulls)
     assert [pull.release_s for pull in report.pulls] == pytest.approx(releases, abs=1e-3)
     assert [pull.grasp_s for pull in report.pulls] == pytest.approx(grasps, abs=0.021)
     assert "rest" not in {caution.about for caution in report.cautions}
     with pytest.raises(UserError, match="--pulls: at most 10 in one recording, got 11"):
-        plan_recording(recorded[2], "band1", pulls=11)
+        plan_recording(recorded[2], BAND, pulls=11)
 
 
 def test_an_earlier_recording_gives_base_frame_and_force(recorded) -> None:
     """Frame and force are the recording's; the law there is its formula, known at its own draw."""
     path, plan, params, truth = recorded
     unknown = with_(params, "setup", base_to_fork=None)
-    again = plan_recording(unknown, "band1", recording=path)
+    again = plan_recording(unknown, BAND, recordings=[path])
     np.testing.assert_allclose(again.base.translation, plan.base.translation, atol=1e-6)
     np.testing.assert_allclose(again.hand, plan.hand, atol=1e-6)
     assert again.base_source == f"/tf_static fork <- base of {path}"
     force = float(np.linalg.norm(truth.force(truth.release - 0.1)))
     assert again.force.force == pytest.approx(force, rel=0.01)
-    deeper = plan_recording(unknown, "band1", recording=path, draw=(-0.44, 0.0)).force
+    deeper = plan_recording(unknown, BAND, recordings=[path], draw=(-0.44, 0.0)).force
     stretch = 2 * np.hypot(0.1375, np.array([0.4, 0.44])) / REST
     tension = stretch - stretch**-2
     cosine = np.array([0.4, 0.44]) / np.hypot(0.1375, [0.4, 0.44])
@@ -126,24 +124,21 @@ def test_an_earlier_recording_gives_base_frame_and_force(recorded) -> None:
 
     weak = with_(unknown, "setup", max_force=force - 2)
     with pytest.raises(UserError, match=r"N more than setup.max_force .*--draw=-0\.\d\d,0\.00"):
-        plan_recording(weak, "band1", recording=path)
+        plan_recording(weak, BAND, recordings=[path])
 
 
-def test_the_bands_own_recording_tells_it_unasked(recorded, tmp_path) -> None:
-    """As `aim` takes the fork from there; one that cannot be read is passed over."""
+def test_of_several_recordings_the_first_that_can_be_read_tells(recorded, tmp_path) -> None:
     path, plan, params, _ = recorded
-    unknown, raw = with_(params, "setup", base_to_fork=None), tmp_path / "data/raw/band1"
-    raw.mkdir(parents=True)
-    (raw / "a.mcap").write_bytes(b"no recording")
-    assert plan_recording(unknown, "band1", root=tmp_path).base_source is None
-    shutil.copy(path, raw / "b.mcap")
-    again = plan_recording(unknown, "band1", root=tmp_path)
-    requested = plan_recording(unknown, "band1", recording=path)
+    unknown, bad = with_(params, "setup", base_to_fork=None), tmp_path / "a.mcap"
+    bad.write_bytes(b"no recording")
+    assert plan_recording(unknown, BAND).base_source is None
+    again = plan_recording(unknown, BAND, recordings=[bad, path])
+    requested = plan_recording(unknown, BAND, recordings=[path])
     np.testing.assert_allclose(again.base.translation, plan.base.translation, atol=1e-6)
     assert (again.frame, again.force.force) == (requested.frame, requested.force.force)
-    assert again.base_source == f"/tf_static fork <- base of {raw / 'b.mcap'}"
+    assert again.base_source == f"/tf_static fork <- base of {path}"
     with pytest.raises(UserError, match="a.mcap: not an MCAP file"):
-        plan_recording(unknown, "band1", recording=raw / "a.mcap", root=tmp_path)
+        plan_recording(unknown, BAND, recordings=[bad])
 
 
 def test_of_several_pulls_the_first_that_can_be_used_tells(recorded, monkeypatch) -> None:
@@ -174,6 +169,6 @@ def test_a_recording_without_a_pull_gives_the_frame_alone(recorded, tmp_path) ->
     path = tmp_path / "still.mcap"
     write_bag(path, Truth(stiffness=0.0), cameras=False, rate=200)
     unknown = with_(recorded[2], "setup", base_to_fork=None)
-    plan = plan_recording(unknown, "band1", recording=path)
+    plan = plan_recording(unknown, BAND, recordings=[path])
     assert plan.force.force is None
     assert "no release of a drawn band is in it" in plan.force.source

@@ -12,17 +12,20 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 from pipeline.params import Params, load
+from sling2sim2real import Band, Identification, Settings, Theta
+from sling2sim2real.api.identification import Fork
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.plan import limits
 from sling2sim2real.cli.plan.force import Earlier, Held, predict
 from sling2sim2real.cli.plan.messages import COLUMNS
-from sling2sim2real.cli.plan.plan import plan_recording, with_band
+from sling2sim2real.cli.plan.plan import known_band, plan_recording
 from sling2sim2real.cli.plan.trajectory import Phase, Trajectory
 from sling2sim2real.settings.lab import Dip, Gripper
 from tests.project import DEFAULTS, with_
 
 pytestmark = pytest.mark.usefixtures("nowhere")
 
+BAND = Band(mass=0.023, diameter=0.010, rest_length=0.52, name="band1")
 FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target along the base's x
 
 
@@ -34,7 +37,7 @@ def params() -> Params:
 
 @pytest.fixture(scope="module")
 def plan(params):
-    return plan_recording(params, "band1", draw=(-0.35, -0.1))
+    return plan_recording(params, BAND, draw=(-0.35, -0.1))
 
 
 def dip(**values: float) -> Dip:
@@ -151,7 +154,7 @@ def franka_moves_to(command: dict, width: float) -> float:
 
 
 def test_a_frankas_own_server_opens_closes_and_opens(params, tmp_path) -> None:
-    plan, width, gaps = plan_recording(params, "band1", pulls=2), 0.02, []
+    plan, width, gaps = plan_recording(params, BAND, pulls=2), 0.02, []
     for row in json.loads(plan.write(tmp_path, 10.0)[2].read_text()):
         width = franka_moves_to(row["command"], width)
         gaps.append(width)
@@ -178,7 +181,7 @@ def test_a_position_that_is_none_is_refused(position) -> None:
 
 def test_without_a_base_the_plan_is_in_frame_o_and_says_so(params, tmp_path) -> None:
     unknown = with_(params, "setup", base_to_fork=None)
-    plan = plan_recording(unknown, "band1", draw=(-0.35, -0.1))
+    plan = plan_recording(unknown, BAND, draw=(-0.35, -0.1))
     files = plan.write(tmp_path, 10.0)
     columns, _ = table(files[0])
     times = columns["t"]
@@ -193,13 +196,13 @@ def test_without_a_base_the_plan_is_in_frame_o_and_says_so(params, tmp_path) -> 
     assert "nothing says where it stands in the robot's base, so all is in frame O" in output
     turned = with_(unknown, "plan", orientation=(0.0, 0.0, 0.0, 1.0))
     with pytest.raises(UserError, match="plan.orientation is the hand's in the robot's base"):
-        plan_recording(turned, "band1")
+        plan_recording(turned, BAND)
 
 
 def test_what_is_printed(plan, tmp_path) -> None:
     text = plan.to_text([tmp_path / "a.csv"])
     assert f"wrote {tmp_path / 'a.csv'}" in text
-    assert "not checked: no θ file and no recording was given" in text
+    assert "not checked: the band is not identified, and no recording was given" in text
     content = json.loads(plan.to_json([tmp_path / "a.csv"]))
     assert content["files"] == [str(tmp_path / "a.csv")]
     assert content["base_to_fork"] == pytest.approx(FORK_IN_BASE)
@@ -231,9 +234,9 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
         ("plan", {"floor_clearance": 0.4}, "0.318 m above the floor, 0.082 m less than plan.floor"),
         ("plan", {"orientation": (0.5, 0.5, 0.5, -0.5)}, "plan.orientation: the fingers (z) would"),
         (
-            "bands.band1",
-            {"diameter": 0.09},
-            "plan.gripper.open: 0.08 m is no wider than the band, 0.09 m thick",
+            "plan",
+            {"gripper": Gripper(open=0.009, closed=0.0, position="finger")},
+            "plan.gripper.open: 0.009 m is no wider than the band, 0.01 m thick",
         ),
         ("episode", {"longest": 7.0}, "it takes 7.71 s, 1.51 s more than episode.longest 7 less"),
         ("plan", {"pull_speed": 0.05}, "raise plan.pull_speed to 0.052, or episode.longest to "),
@@ -249,37 +252,37 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
 )
 def test_what_is_refused_and_how_it_is_said(params, section, values, expected) -> None:
     with pytest.raises(UserError) as error:
-        plan_recording(with_(params, section, **values), "band1")
+        plan_recording(with_(params, section, **values), BAND)
     assert expected in str(error.value) and "\n" not in str(error.value)
 
 
 def test_the_advice_of_a_refusal_is_enough(params) -> None:
     """With what the line says, and nothing else changed, the plan is accepted."""
-    plan_recording(with_(params, "plan", pull_speed=0.052), "band1")
+    plan_recording(with_(params, "plan", pull_speed=0.052), BAND)
     slow = with_(params, "plan", pull_speed=0.05)
-    plan_recording(with_(slow, "episode", longest=20.6), "band1")
+    plan_recording(with_(slow, "episode", longest=20.6), BAND)
     with pytest.raises(UserError, match=r"draw by 0.251 m at least, not 0.200 m"):
-        plan_recording(params, "band1", draw=(-0.2, 0.0))
-    plan_recording(params, "band1", draw=(-0.252, 0.0))
+        plan_recording(params, BAND, draw=(-0.2, 0.0))
+    plan_recording(params, BAND, draw=(-0.252, 0.0))
 
 
 def test_the_advice_with_dips_and_preconditioning_is_enough(params) -> None:
     """The speed that the line names is that of the pull, and is accepted."""
     dips = with_(params, "plan", dips=(dip(), dip(at=0.7)))
     with pytest.raises(UserError, match="take a smaller --precondition, or take --pull") as error:
-        plan_recording(dips, "band1", precondition=2)
+        plan_recording(dips, BAND, precondition=2)
     progress = float(str(error.value).split("raise plan.pull_speed to ")[1].split(",")[0])
-    plan_recording(with_(dips, "plan", pull_speed=progress), "band1", precondition=2)
-    plan_recording(with_(params, "plan", dips=load(DEFAULTS).plan.dips), "band1", precondition=1)
+    plan_recording(with_(dips, "plan", pull_speed=progress), BAND, precondition=2)
+    plan_recording(with_(params, "plan", dips=load(DEFAULTS).plan.dips), BAND, precondition=1)
     with pytest.raises(UserError, match="--precondition: at most 10, got 11"):
-        plan_recording(dips, "band1", precondition=11)
+        plan_recording(dips, BAND, precondition=11)
 
 
 def test_the_informative_pull_is_the_default(params, tmp_path) -> None:
     dips = with_(params, "plan", dips=(dip(), dip(at=0.7)))
-    plan, paper = (plan_recording(dips, "band1", pull=pull) for pull in ("informative", "paper"))
-    assert plan_recording(dips, "band1").content() == plan.content()
-    assert paper.content() == {**plan_recording(params, "band1").content(), "pull": "paper"}
+    plan, paper = (plan_recording(dips, BAND, pull=pull) for pull in ("informative", "paper"))
+    assert plan_recording(dips, BAND).content() == plan.content()
+    assert paper.content() == {**plan_recording(params, BAND).content(), "pull": "paper"}
     names = [row["phase"] for row in plan.rows()]
     assert (names.count("let back"), names.count("redraw"), plan.dips) == (2, 2, 2)
     assert plan.held_time == pytest.approx(paper.held_time + 4.0, abs=1e-6)
@@ -311,55 +314,59 @@ def test_a_held_string_pulls_as_its_formula() -> None:
     assert held.stretch(part * point) == pytest.approx(1.1)
 
 
-def test_the_force_by_theta(params, tmp_path) -> None:
-    from sling2sim2real.identification.results.mounting import load_sling
-    from sling2sim2real.simulator.launch import launch
-    from sling2sim2real.simulator.model import LaunchSetup
-    from sling2sim2real.simulator.parameters import THETA, Parameters
-
-    values = 3e5, 0.45, 5e-3, 0.5, 1.0
-    path = tmp_path / "theta.json"
-    theta = dict(zip(THETA, values, strict=True))
-    path.write_text(json.dumps({"band": "band1", "theta": theta}))
-    setup = LaunchSetup.of(params.setup, params.sling)
-    done = launch(
-        load_sling(params, "band1"), setup, Parameters.of("neo_hookean", values), (-0.3, -0.2)
-    )
-    held = float(done.hold_force[0])
-    planned = plan_recording(params, "band1", draw=(-0.3, -0.2), theta=path)
+def test_the_force_by_theta(params) -> None:
+    theta = Theta(3e5, 0.45, 5e-3, 0.5, 1.0)
+    settings = Settings.default()
+    found = Identification(BAND, theta, settings=settings)
+    held = float(found.launches((-0.3, -0.2)).hold_force[0])
+    planned = plan_recording(params, BAND, draw=(-0.3, -0.2), found=found)
     assert planned.force.force == held
 
     weak = with_(params, "setup", max_force=held - 1)
     with pytest.raises(UserError, match="1.0 N more than setup.max_force") as error:
-        plan_recording(weak, "band1", draw=(-0.3, -0.2), theta=path)
+        plan_recording(weak, BAND, draw=(-0.3, -0.2), found=found)
     advised = tuple(map(float, str(error.value).split("--draw=")[1].split(",")))
-    assert plan_recording(weak, "band1", draw=advised, theta=path).force.force < held - 1
+    assert plan_recording(weak, BAND, draw=advised, found=found).force.force < held - 1
 
 
 def test_a_force_where_the_band_should_be_slack(params) -> None:
     shallow = Earlier(Path("a.mcap"), None, "", "", 5.0, np.array([0.0, -0.15, 0.0]), None)
     with pytest.raises(UserError, match="a.mcap: holds 5.0 N where the band should be slack"):
-        predict(params, "band1", np.array([0.0, -0.4, 0.0]), None, shallow)
+        predict(Held.of(BAND, params.setup), np.array([0.0, -0.4, 0.0]), None, shallow)
 
 
 def test_a_band_that_the_arm_cannot_hold(params) -> None:
     strong = Earlier(Path("a.mcap"), None, "", "", 900.0, np.array([0.0, -0.4, 0.0]), None)
-    held, drawn = Held.of(params.bands["band1"], params.setup), np.array([0.0, -0.4, 0.0])
+    held, drawn = Held.of(BAND, params.setup), np.array([0.0, -0.4, 0.0])
     with pytest.raises(UserError, match="900.0 N .* the band is too stiff for this arm"):
-        limits.check_force(params.setup, held, drawn, predict(params, "band1", drawn, None, strong))
+        limits.check_force(params.setup, held, drawn, predict(held, drawn, None, strong))
 
 
-def test_a_band_to_come_is_planned_by_its_sizes(params) -> None:
-    unchanged, name = with_band(params, "band1")
-    assert (unchanged, name) == (params, "band1")
-    longer, name = with_band(params, None, 0.04, 0.02, 0.6)
-    assert name == "new" and longer.bands["new"].rest_length == 0.6 and "new" not in params.bands
-    assert plan_recording(longer, name).stretch < plan_recording(params, "band1").stretch
-    assert with_band(params, "red", None, None, 0.6)[1] == "red"
+def test_a_band_to_come_is_planned_by_its_sizes(params, fitted, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    longer = known_band(None, {"mass": 0.04, "diameter": 0.02, "rest_length": 0.6})
+    assert longer.band.name == "new" and longer.found is None and longer.recordings == []
+    assert plan_recording(params, longer.band).stretch < plan_recording(params, BAND).stretch
+    assert known_band(None, {"rest_length": 0.6}).band.diameter == 0.010  # the usual one
     for arguments, words in (
-        ((None,), "give --band, or --diameter and --rest-length of a band to come"),
-        (("band1", 0.04), "--band band1 brings its sizes from params.yaml"),
-        ((None, None, None, 0.2), "--rest-length 0.2: must be longer than setup.fork_width 0.275"),
+        ((None, {}), "give a band's folder, or --diameter and --rest-length of one to come"),
+        ((Path("bands/no"), {}), "bands/no: is no folder of a band"),
+        ((None, {"rest_length": 0.2}), "--rest-length 0.2: must be longer than setup.fork_width"),
     ):
         with pytest.raises(UserError, match=words):
-            with_band(params, *arguments)
+            known_band(*arguments)
+    monkeypatch.chdir(fitted)
+    known = known_band(Path("bands/toy"), {})
+    assert known.band.name == "toy" and known.found and len(known.recordings) == 1
+    with pytest.raises(UserError, match="band.yaml has the band's sizes: leave these out"):
+        known_band(Path("bands/toy"), {"mass": 0.04})
+
+
+def test_where_the_fork_was_identified_it_stands(params) -> None:
+    unknown = with_(params, "setup", base_to_fork=None)
+    fork = Fork(pose=FORK_IN_BASE, frame="arm")
+    found = Identification(BAND, Theta(3e5, 0.45, 5e-3, 0.5, 1.0), fork=fork)
+    plan = plan_recording(unknown, BAND, draw=(-0.35, -0.1), found=found)
+    known = plan_recording(params, BAND, draw=(-0.35, -0.1))
+    assert plan.frame == "arm"
+    np.testing.assert_allclose(plan.base.translation, known.base.translation)

@@ -1,23 +1,21 @@
 """The recordings of tests/recording, looked at once."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
-from pipeline.params import Params
-from sling2sim2real.cli.preflight.check import Look, band_of, look_at
+from sling2sim2real.cli.preflight.check import GivenBand, Look, look_at
 from sling2sim2real.recording.build import Processed, process
 from sling2sim2real.recording.events import Part
+from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import BandParams
-from tests.project import DEFAULTS
 from tests.recording.conftest import blind, masked, params, seen
 
 __all__ = ["blind", "masked", "params", "seen"]
 PROCESSED: dict[str, Processed] = {}
 
 
-def processed_once(part: Part, band: BandParams, params: Params, weighed: bool) -> Processed:
+def processed_once(part: Part, band: BandParams, params: Settings, weighed: bool) -> Processed:
     """`process`, which for equal pulls of a file is worked out once in all these tests."""
     if params.cloud.mask == "folder":  # the masks may be others
         return process(part, band, params, weighed)
@@ -35,19 +33,9 @@ def each_pull_is_processed_once() -> Iterator[None]:
         yield
 
 
-@pytest.fixture
-def project(tmp_path: Path) -> Path:
-    """A project's folder whose window suits the small recordings."""
-    text = DEFAULTS.read_text()
-    for old, new in (
-        ("duration: 9.0", "duration: 3.6"),
-        ("samples: 300", "samples: 120"),
-        ("tail: 0.7", "tail: 0.5"),
-    ):
-        assert old in text
-        text = text.replace(old, new)
-    (tmp_path / "params.yaml").write_text(text)
-    return tmp_path
+def band_of(params: Settings, **sizes: float) -> GivenBand:
+    """What is known of a band by a command line."""
+    return GivenBand.of(sizes, params.setup)
 
 
 @pytest.fixture(scope="session")

@@ -2,17 +2,20 @@
 
 import json
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
+from sling2sim2real.api.band_folder import BandFolder
 from sling2sim2real.base.errors import UserError, printable
-from sling2sim2real.cli.preflight.check import band_of, look_at
-from sling2sim2real.cli.preflight.command import check
+from sling2sim2real.cli.preflight.check import look_at
+from sling2sim2real.cli.preflight.command import check, check_band, checked
 from sling2sim2real.cli.preflight.facts import BandFacts
 from sling2sim2real.cli.preflight.report import CheckReport
 from sling2sim2real.recording.checks import Finding
+from tests.cli.preflight.conftest import band_of
 from tests.hostile import MARKUP
 from tests.project import with_
 from validation.recordings.bag import (
@@ -45,7 +48,7 @@ def test_the_report_of_a_good_recording(looked, seen) -> None:
     assert content["cloud"]["taut_coverage"] > 0.9
     assert content["cloud"]["taut_offset_m"] == pytest.approx(RADIUS, abs=0.002)
     sizes = {"diameter_m": 0.010, "rest_length_m": 0.52, "mass_kg": None}
-    source = "assumed: --diameter 0.01 and --rest-length 0.52; give yours, or --band"
+    source = "assumed: --diameter 0.01 and --rest-length 0.52; give yours"
     assert content["band"] == sizes | {"source": source}
     roles = {row["role"]: row for row in content["topics"] if row["role"]}
     assert {"wrench", "pose", "gripper", "color", "depth"} <= set(roles)
@@ -146,7 +149,7 @@ def test_a_disk_that_is_full_is_one_line(seen, params, tmp_path, monkeypatch) ->
 
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: full())
     with pytest.raises(UserError, match="out.png: cannot be written .No space left"):
-        check(seen[0], params, sheet=tmp_path / "out.png")
+        checked(seen[0], params, band_of(params), sheet=tmp_path / "out.png")
     assert not list(tmp_path.iterdir())
 
 
@@ -167,20 +170,13 @@ def test_a_report_without_pictures_of_the_band_has_its_signals(refused, blind) -
 
 
 def test_the_band_of_a_command_line(params) -> None:
-    assert band_of(params, "band1").params is params.bands["band1"]
-    assert "band1" in band_of(params, "band1").source and band_of(params, "band1").weighed
     assert not band_of(params).weighed
     band = band_of(params, mass=0.2, diameter=0.008)
     assert band.weighed and (band.params.mass, band.params.diameter) == (0.2, 0.008)
     assert band.params.rest_length == 0.52 and "assumed: --rest-length 0.52" in band.source
     assert band_of(params, diameter=0.008, rest_length=0.5).source == "given"
-    for sizes, words in (
-        ({"name": "red"}, "--band red: not in params.yaml, which has band1"),
-        ({"name": "band1", "diameter": 0.01}, "leave these out"),
-        ({"rest_length": 0.2}, "--rest-length 0.2: must be longer"),
-    ):
-        with pytest.raises(UserError, match=words):
-            band_of(params, **sizes)
+    with pytest.raises(UserError, match="--rest-length 0.2: must be longer"):
+        band_of(params, rest_length=0.2)
 
 
 def test_without_a_mass_nothing_is_judged_by_one(tmp_path, params) -> None:
@@ -195,7 +191,9 @@ def test_without_a_mass_nothing_is_judged_by_one(tmp_path, params) -> None:
 
     path = blind_bag(tmp_path, change=edit(wrench=heavy))
     for given, said in ((None, False), (mass, False), (0.03, True)):
-        report = look_at(path, params, band_of(params, mass=given)).report
+        report = look_at(
+            path, params, band_of(params, **({} if given is None else {"mass": given}))
+        ).report
         assert ("direction" in abouts(report)) == said
         assert ("no mass given" in report.to_text()) == (given is None)
 
@@ -211,18 +209,25 @@ def test_outputs_are_refused_before_anything_is_read(tmp_path, params) -> None:
         ({"rrd": missing}, "must end with .rrd"),
     ):
         with pytest.raises(UserError, match=words):
-            check(missing, params, **options)
+            checked(missing, params, band_of(params), **options)
     with pytest.raises(UserError, match="no such file"):
-        check(missing, params, sheet=tmp_path / "out.png")
+        checked(missing, params, band_of(params), sheet=tmp_path / "out.png")
     assert [p.name for p in tmp_path.iterdir()] == ["folder.png"]
 
 
-def test_the_whole_command(seen, params, tmp_path) -> None:
-    sheet = tmp_path / "out.png"
-    text, status = check(seen[0], params, band="band1", as_json=True, sheet=sheet)
+def test_the_whole_command(fitted, tmp_path, monkeypatch) -> None:
+    """By the settings of the lab: of a recording, and of a band's folder by its sizes."""
+    monkeypatch.chdir(fitted)
+    sheet, folder = tmp_path / "out.png", BandFolder.at(Path("bands/toy"))
+    text, status = check(Path("seen.mcap"), {"mass": 0.03}, as_json=True, sheet=sheet)
     content = json.loads(text)
     assert status == 0 and content["usable"] and sheet.exists()
-    assert str(sheet) in content["written"][0] and "band1" in content["band"]["source"]
+    assert str(sheet) in content["written"][0] and content["band"]["mass_kg"] == 0.03
+    text, status = check_band(folder, {}, as_json=True)
+    known = json.loads(text)["band"]
+    assert known == content["band"] | {"source": "bands/toy/band.yaml"}
+    with pytest.raises(UserError, match=r"band.yaml has the band's sizes: leave these out"):
+        check_band(folder, {"mass": 0.04}, as_json=False)
 
 
 @pytest.mark.parametrize("name", MARKUP)

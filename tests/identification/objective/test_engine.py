@@ -24,8 +24,8 @@ def test_ours_needs_no_import() -> None:
 def test_an_installed_engine_is_found_by_its_name(monkeypatch) -> None:
     """As pyproject.toml offers it; an installation from before that says what to do."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    offered = project["entry-points"][engine.GROUP]
-    points = EntryPoints(EntryPoint(*pair, engine.GROUP) for pair in offered.items())
+    offered = project["entry-points"][engine.ENTRY_POINT_GROUP]
+    points = EntryPoints(EntryPoint(*pair, engine.ENTRY_POINT_GROUP) for pair in offered.items())
     monkeypatch.setattr(engine, "entry_points", points.select)
     assert [*offered] == [name for name in ENGINES if name != OUR_ENGINE]
     assert simulate_of("physx") is rollouts.simulate

@@ -12,7 +12,7 @@ PHI, INNER, FORCES, BINS = 4, 3, 15, 12
 PICTURE = np.repeat([7, 8, 9], 4)
 NAMES = [f"{name}_{axis}" for axis in "xyz" for name in ("force_bias", "force_drift")]
 NAMES += [f"{name}_{axis}" for axis in "xyz" for name in ("cloud_shift", "cloud_turn")]
-NAMES += ["force_late"]
+NAMES += ["force_delay"]
 
 
 class Case:
@@ -61,14 +61,14 @@ class Case:
         linear = [
             sizes[name[:-2]] * column
             for name, column in self.columns.items()
-            if name != "force_late"
+            if name != "force_delay"
         ]
-        linear.append(has.pose * self.columns["force_late"])
+        linear.append(has.pose * self.columns["force_delay"])
         linear += [
             has.jitter * np.where(self.residuals.of_picture(picture), self.nuisance_slopes[1], 0)
             for picture in (8, 9)
         ]
-        sigma = self.spread(has.force, has.cloud, has.way)
+        sigma = self.spread(has.force, has.cloud, has.recoil)
         rows = np.concatenate([self.slopes, self.nuisance_slopes, linear]).T / sigma[:, None]
         count = len(linear)
         inner = np.zeros((INNER, rows.shape[1]))
@@ -129,7 +129,7 @@ def test_elimination_leaves_of_any_residuals_what_least_squares_does(case):
     expansion, (rows, aim) = case.expanded(), case.full()
     some = case.gap + np.random.default_rng(2).normal(0, 0.1, (3, len(case.gap)))
     has = case.tolerances
-    sigma = case.spread(has.force, has.cloud, has.way)
+    sigma = case.spread(has.force, has.cloud, has.recoil)
     priors = np.tile(case.nuisances / has.simulated, (3, 1))
     cleared = expansion.cleared(np.hstack([expansion.form.whitened(some), priors]))
     for residuals, left in zip(some, cleared, strict=True):
@@ -138,7 +138,7 @@ def test_elimination_leaves_of_any_residuals_what_least_squares_does(case):
         assert left @ left == pytest.approx(np.sum((goal - rows[:, PHI:] @ best) ** 2), rel=1e-9)
 
 
-NAMED = "force cloud way release camera hand jitter shift turn bias drift pose".split()
+NAMED = "force cloud recoil release camera hand jitter shift turn bias drift pose".split()
 
 
 @pytest.mark.parametrize("name", NAMED)

@@ -42,7 +42,7 @@ def test_it_finds_scipys_minimum(count):
 
 def test_a_bound_holds_the_mode_and_the_others_give_way(monkeypatch):
     """A minimum beyond zero: at zero, and the rest where SciPy's bounded minimum has it."""
-    monkeypatch.setattr(module, "STILL", 0.05)
+    monkeypatch.setattr(module, "SETTLED_SIZE", 0.05)
     seen = [Curve(curve(np.array([8.0, 9.0, -0.5]) * SIZE))]
     box = space()
     result = fit(seen, box, START)
@@ -112,7 +112,7 @@ def test_a_step_into_failing_launches_is_taken_shorter():
 
 
 def test_launches_that_fail_at_the_start_count_once_they_land(monkeypatch):
-    monkeypatch.setattr(module, "STILL", 0.02)
+    monkeypatch.setattr(module, "SETTLED_SIZE", 0.02)
     first, second = curves(2)
     launches = Launches(second, lambda phi: phi[1] < 8 * SIZE[1])
     result = fit([first], space(), START, launches=launches)
@@ -166,7 +166,7 @@ def test_it_is_not_settled_where_it_is_stuck():
 
 def test_each_pass_sorts_the_points_into_bins_once(monkeypatch):
     """Or misfits of different densities would be compared."""
-    monkeypatch.setattr(module, "STILL", 1e-3)
+    monkeypatch.setattr(module, "SETTLED_SIZE", 1e-3)
     seen = curves(1)
     fit(seen, space(), START)
     begun = [number for number, kept in enumerate(seen[0].retained) if kept is None]
@@ -223,7 +223,7 @@ def test_priors_are_not_widened_by_what_recordings_disagree():
 
 
 def test_no_step_is_longer_than_said(monkeypatch):
-    monkeypatch.setattr(module, "LONGEST", 1.0)
+    monkeypatch.setattr(module, "LONGEST_STEP", 1.0)
     seen = curves(1)
     fit(seen, space(), START)
     moved = np.abs(np.diff(seen[0].requested[:4], axis=0)) / SIZE

@@ -10,7 +10,7 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.signal import cutoff_hz
 from sling2sim2real.identification.posterior import coordinates, identify
 from sling2sim2real.identification.posterior.coordinates import Coordinates
-from sling2sim2real.identification.posterior.fit import STILL
+from sling2sim2real.identification.posterior.fit import SETTLED_SIZE
 from sling2sim2real.identification.posterior.launches import LaunchLikelihood, Observed
 from sling2sim2real.identification.posterior.likelihood import Likelihood
 from sling2sim2real.identification.posterior.residuals import Residuals, Rule
@@ -66,14 +66,14 @@ def test_what_moves_a_whole_picture_of_the_recoil_counts_as_one_error(first) -> 
     count = len(weight) - 2 * len(seen.picture)
     picture = seen.picture[seen.recoils][0]
     bins = np.flatnonzero(seen.picture == picture)
-    gone = seen.gone()[bins[0]]
+    gone = seen.travelled()[bins[0]]
     for signs, repeated in ((1.0, np.sqrt(len(bins))), ((-1.0) ** np.arange(len(bins)), 1.0)):
         left = np.zeros_like(expansion.left)
         left[count + bins] = 2e-3 * signs * weight[count + bins]
         discrepancy = replace(expansion, left=left).recoil_discrepancy
         assert discrepancy == pytest.approx(2e-3 / gone * repeated, rel=0.25)
         wider = first.recordings[0].with_wider_tolerances(replace(expansion, left=left)).tolerances
-        assert wider.way == max(first.recordings[0].tolerances.way, discrepancy)
+        assert wider.recoil == max(first.recordings[0].tolerances.recoil, discrepancy)
 
 
 def told_of(result) -> dict:
@@ -92,7 +92,7 @@ def test_the_truth_is_found_where_no_prior_pulls(exact, monkeypatch):
     result = found_of(*exact)
     assert result.fit.settled
     gap = result.fit.phi - TRUE
-    assert np.sqrt(gap @ result.fit.hessian @ gap) < 4 * STILL  # of standard deviations
+    assert np.sqrt(gap @ result.fit.hessian @ gap) < 4 * SETTLED_SIZE  # of standard deviations
     assert abs(gap[0]) < 4e-3 and abs(gap[1]) < 0.15
 
 
@@ -230,7 +230,7 @@ def test_pictures_count_by_time_and_by_the_measured_cloud(exact):
     assert since[Rule(latest=1e-6).pictures(episode)].max() < 0
     first = since[since > 0].min()
     assert since[Rule(recoil=1e-6).pictures(episode)].max() == first  # for want of earlier ones
-    assert since[Rule(recoil=0.2, latest=0.2, way=-1.0).pictures(episode)].max() > 0.1
+    assert since[Rule(recoil=0.2, latest=0.2, least_share=-1.0).pictures(episode)].max() > 0.1
     home = [np.where(t > 0, 0 * c, c) for t, c in zip(since, episode.clouds, strict=True)]
     came_back = since[Rule().pictures(replace(episode, clouds=home))]
     assert np.count_nonzero(came_back > 0) == 1
@@ -251,7 +251,7 @@ def test_where_no_picture_of_the_drawn_band_counts_the_way_begins_at_the_hand(ex
         clouds=[episode.clouds[number] for number in others],
     )
     (expansion,), (usual,) = found_of(few).fit.expansions, first.fit.expansions
-    gone, expected = (some.form.residuals.gone().max() for some in (expansion, usual))
+    gone, expected = (some.form.residuals.travelled().max() for some in (expansion, usual))
     assert gone == pytest.approx(expected, abs=5e-3)
     assert 0 < expansion.recoil_discrepancy < 1
 

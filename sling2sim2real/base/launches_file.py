@@ -101,9 +101,11 @@ def write_launches(path: Path, rows: Sequence[LaunchRow]) -> None:
     """Write them all; whole or not at all."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    more = any(row.method for row in rows)
+    writer.writerow((*COLUMNS, *MORE) if more else COLUMNS)
     for row in rows:
         cells = (*row.draw, row.error, row.landing, row.use)
+        cells += (row.target, row.method) if more else ()
         writer.writerow("" if cell is None else cell for cell in cells)
     write_text(path, text.getvalue())
 
@@ -112,7 +114,7 @@ def _row(where: str, cells: dict[str, str]) -> LaunchRow:
     use = cells["use"] or FIT
     if use not in USES:
         raise UserError(f"{where}: use must be {' or '.join(USES)}, got {use!r}")
-    y, z, error, landing = (_metres(where, name, cells[name]) for name in COLUMNS[:4])
+    y, z, error, landing = (metres(where, name, cells[name]) for name in COLUMNS[:4])
     if y is None or z is None:
         raise UserError(f"{where}: a launch needs draw_y and draw_z")
     if landing is None and use == FIT:
@@ -120,11 +122,12 @@ def _row(where: str, cells: dict[str, str]) -> LaunchRow:
     method = cells["method"]
     if method and use == FIT:
         raise UserError(f"{where}: a launch that a policy aimed is to check: make its use check")
-    target = _metres(where, "target", cells["target"]) if method else None  # else nobody aimed it
+    target = metres(where, "target", cells["target"]) if method else None  # else nobody aimed it
     return LaunchRow((y, z), error, landing, use, target, method)
 
 
-def _metres(where: str, name: str, text: str) -> float | None:
+def metres(where: str, name: str, text: str) -> float | None:
+    """A cell of a column of lengths; None where it is empty. Raises UserError: `where` and why."""
     if not text:
         return None
     try:

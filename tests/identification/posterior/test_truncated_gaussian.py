@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sling2sim2real.identification.posterior.draws import truncated_gaussian
+from sling2sim2real.identification.posterior.sampling import truncated_gaussian
 
 
 def sampled(centre, precision, low, high, count=4000, seed=0) -> np.ndarray:

@@ -1,1 +1,0 @@
-"""`sling fit`: a band from its recordings to its card, by the stages of dvc.yaml."""

@@ -496,10 +496,10 @@ def _of_delays(delays: Delays) -> Iterator[Finding]:
     if delays.conflict:
         yield found("clock_unknown", delays.conflict, ONE_CLOCK)
     if delays.release is not None:
-        yield from _of_release(delays.release)
+        yield from of_release(delays.release)
 
 
-def _of_release(seen: ReleasePictures) -> Iterator[Finding]:
+def of_release(seen: ReleasePictures) -> Iterator[Finding]:
     """Of the pictures around the release, with the camera's stamps as they were."""
     if seen.frozen:
         first, count = seen.frozen[0], len(seen.frozen)

@@ -19,7 +19,6 @@ NEAR = 0.025  # m around the straight lines from the tips to the hand
 OUTER, HAND = 0.78, 0.05  # share of them from which on, m before the hand until which, is looked
 FEWEST = 30  # points of the drawn band
 SEEN = 0.5  # share of them from which a picture shows it drawn
-FADED = 0.15  # share of the drawn band: a sound picture shows less of it
 MOVES = 0.002  # s after the fall of the force from which no picture is the one before
 SURELY = 0.1  # s after which every band is gone
 EMPTY_AFTER = 0.015  # s after the fall of the force in which the outer fifth is empty
@@ -35,7 +34,6 @@ class ReleasePictures:
             release [s].
         again: Stamps of pictures after it that show the drawn band once more.
         repeated: Stamps of pictures around the release that are those before them, pixel by pixel.
-        faded: Share of the drawn band that the first pictures after it still show.
         never: No picture shows the band let go; what is said of the next picture is void.
     """
 
@@ -45,7 +43,6 @@ class ReleasePictures:
     gone: float
     again: tuple[float, ...]
     repeated: tuple[float, ...]
-    faded: tuple[float, ...]
     never: bool = False
 
     @property
@@ -73,11 +70,6 @@ class ReleasePictures:
     def frozen(self) -> tuple[float, ...]:
         """Stamps of pictures that are sent again while the band must move [s]."""
         return tuple(time for time in self.repeated if time > MOVES)
-
-    @property
-    def smeared(self) -> bool:
-        """Whether the drawn band is still seen in part a picture after it is gone."""
-        return max(self.faded[1:3], default=0.0) > FADED
 
 
 def release_pictures(pull: Pull, fork_width: float) -> ReleasePictures | None:
@@ -111,7 +103,7 @@ def release_pictures(pull: Pull, fork_width: float) -> ReleasePictures | None:
     gone = np.flatnonzero((share < SEEN) & (times > -AROUND))
     if not len(gone) and np.sum(times > SURELY) > 2:
         last = float(times[-1])
-        return ReleasePictures(last, last, last, last, (), tuple(repeated), (), never=True)
+        return ReleasePictures(last, last, last, last, (), tuple(repeated), never=True)
     if not len(gone) or gone[0] == 0 or gone[0] == len(times) - 1:
         return None
     first = int(gone[0])
@@ -123,7 +115,6 @@ def release_pictures(pull: Pull, fork_width: float) -> ReleasePictures | None:
         gone=empty,
         again=tuple(times[first:][share[first:] > SEEN].tolist()),
         repeated=tuple(repeated),
-        faded=tuple(share[first : first + 4].tolist()),
     )
 
 

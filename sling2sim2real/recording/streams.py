@@ -303,7 +303,7 @@ def streams_of(
     streams = _usable({role: partial(_sorted, raw) for role, raw in topics.items()}, notes)
     wrench = topics["wrench"]
     for role in set(streams) - {"wrench", *TIMED}:
-        clock = _course(topics[role], wrench)
+        clock = course_of(topics[role], wrench)
         streams[role] = replace(streams[role], clock=clock)
     origin = int(streams["wrench"].stamp[0])
     first = min(stream.stamp[0] for stream in streams.values())
@@ -327,7 +327,7 @@ def _usable(made: Mapping[str, Callable[[], Value]], notes: list[str]) -> dict[s
 
 
 @dataclass
-class _Raw:
+class RawTopic:
     """One topic as it was read, in the order of the file.
 
     Attributes:
@@ -405,7 +405,7 @@ class _Raw:
             )
 
 
-def _read(role: str, choice: Choice) -> _Raw:
+def _read(role: str, choice: Choice) -> RawTopic:
     """Read a topic's messages. Raises UserError where fewer than two are left."""
     stamps, logs, values, frames, lost = [], [], [], [], Counter()
     seen, bare, reason = set(), 0, ""
@@ -437,7 +437,7 @@ def _read(role: str, choice: Choice) -> _Raw:
         frames.append(frame)
     frame = Counter(frames).most_common(1)[0][0] if frames else ""
     stamp, log = np.array(stamps, np.int64), np.array(logs, np.uint64).astype(np.int64)
-    raw = _Raw(role, choice, frame, stamp, log, np.array(values), lost, reason)
+    raw = RawTopic(role, choice, frame, stamp, log, np.array(values), lost, reason)
     if bare == len(stamps) > 0:
         if role not in TIMED:
             raise UserError(f"topic {raw.topic} has no header stamps, record with time stamps")
@@ -449,13 +449,13 @@ def _read(role: str, choice: Choice) -> _Raw:
     return raw
 
 
-def _expect_some(raw: _Raw) -> None:
+def _expect_some(raw: RawTopic) -> None:
     if len(raw.stamp) < 2:
         reasons = f" ({raw.words()})" if raw.lost else ""
         raise UserError(f"topic {raw.topic} has fewer than two readable messages{reasons}")
 
 
-def _sorted(raw: _Raw) -> Stream[Any]:
+def _sorted(raw: RawTopic) -> Stream[Any]:
     if raw.disorder > 0:
         raw.notes.append(f"{counted(raw.disorder)} out of order, sorted by stamp")
     raw.keep(np.argsort(raw.stamp, kind="stable"))
@@ -483,7 +483,7 @@ def _sorted(raw: _Raw) -> Stream[Any]:
     return Stream(raw.topic, raw.frame, raw.stamp, values, delay, lost, raw.notes, raw.bursts, hold)
 
 
-def _lone(raw: _Raw) -> np.ndarray:
+def _lone(raw: RawTopic) -> np.ndarray:
     """Single values of force or place far from those around them, shape (S,).
 
     By a running median of five, as Hampel's filter, with a fixed limit.
@@ -549,7 +549,7 @@ def _back(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
     return np.flatnonzero(both & (np.abs(way - way_by_log) < -way_by_log / 2)) + 1
 
 
-def _least(raw: _Raw, start: int) -> dict[int, int]:
+def _least(raw: RawTopic, start: int) -> dict[int, int]:
     """Least delay of receipt in each second of log_time [ns]."""
     second, delay = (raw.log - start) // 10**9, raw.log - raw.stamp
     order = np.lexsort([delay, second])
@@ -557,7 +557,7 @@ def _least(raw: _Raw, start: int) -> dict[int, int]:
     return dict(zip(keys.tolist(), delay[order][first].tolist(), strict=True))
 
 
-def _leads(raw: _Raw, wrench: _Raw) -> tuple[np.ndarray, np.ndarray]:
+def _leads(raw: RawTopic, wrench: RawTopic) -> tuple[np.ndarray, np.ndarray]:
     """Seconds in which both have messages, and the excess of the least delays then [s]."""
     start = int(min(raw.log.min(), wrench.log.min()))
     mine, others = _least(raw, start), _least(wrench, start)
@@ -565,7 +565,7 @@ def _leads(raw: _Raw, wrench: _Raw) -> tuple[np.ndarray, np.ndarray]:
     return common, np.array([mine[k] - others[k] for k in common]) * 1e-9
 
 
-def _expect_one_clock(topics: dict[str, _Raw], late: Mapping[str, float]) -> None:
+def _expect_one_clock(topics: dict[str, RawTopic], late: Mapping[str, float]) -> None:
     """Raises UserError about the topic whose clock is furthest from the median of all topics'.
 
     A gripper on another clock is read by log_time.
@@ -599,7 +599,7 @@ def _expect_one_clock(topics: dict[str, _Raw], late: Mapping[str, float]) -> Non
     )
 
 
-def _course(raw: _Raw, wrench: _Raw) -> Clock:
+def course_of(raw: RawTopic, wrench: RawTopic) -> Clock:
     """How a clock goes against the wrench's: a line or a step, whichever fits better."""
     time, lead = _leads(raw, wrench)
     count = len(time)

@@ -11,7 +11,7 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording.checks import of_topics
 from sling2sim2real.recording.delays import correct_delays
 from sling2sim2real.recording.messages import NO_SCHEMA, Channel
-from sling2sim2real.recording.streams import Recording, _course, _Raw, read_recording
+from sling2sim2real.recording.streams import RawTopic, Recording, course_of, read_recording
 from sling2sim2real.recording.topics import Choice
 from tests.project import with_
 from tests.recording.conftest import part_of, pull_of
@@ -57,26 +57,26 @@ def test_a_drift_is_told_by_the_least_delays(rate) -> None:
     for seed in range(5):
         stamp, log = topic(1000.0, 9.0, seed=seed)
         odd = START + np.round((stamp - START) * (1 + rate)).astype(np.int64)
-        clock = _course(raw_of(odd, log), raw_of(*topic(1000.0, 9.0, seed=seed + 10)))
+        clock = course_of(raw_of(odd, log), raw_of(*topic(1000.0, 9.0, seed=seed + 10)))
         assert clock.change == pytest.approx(9 * rate, abs=max(5 * clock.error, 2e-4))
         assert clock.step is None or abs(clock.change) < 2e-4
-    assert _course(raw_of(stamp[:1000], log[:1000]), raw_of(stamp, log)).error == np.inf
+    assert course_of(raw_of(stamp[:1000], log[:1000]), raw_of(stamp, log)).error == np.inf
 
 
 @pytest.mark.parametrize("size", [-0.06, 0.005, 0.06])
 def test_a_step_is_no_drift(size) -> None:
     stamp, log = topic(1000.0, 9.0, seed=3)
     stamp[4000:] += round(1e9 * size)
-    clock = _course(raw_of(stamp, log), raw_of(*topic(1000.0, 9.0)))
+    clock = course_of(raw_of(stamp, log), raw_of(*topic(1000.0, 9.0)))
     assert clock.step == 4 and clock.change == pytest.approx(size, rel=0.05)
     assert clock.error < 0.001
 
 
-def raw_of(stamp: np.ndarray, log: np.ndarray) -> _Raw:
+def raw_of(stamp: np.ndarray, log: np.ndarray) -> RawTopic:
     """A topic whose values are its messages' numbers."""
     values = np.arange(len(stamp))[:, None]
     choice = Choice(Channel("/x", NO_SCHEMA, ""), lambda payload: None)
-    return _Raw("pose", choice, "", stamp.copy(), log.copy(), values, Counter())
+    return RawTopic("pose", choice, "", stamp.copy(), log.copy(), values, Counter())
 
 
 def read(folder, params, **options) -> Recording:

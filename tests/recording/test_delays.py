@@ -230,7 +230,7 @@ def test_the_camera_tells_a_late_pose_from_a_late_start(
     def pictures(pull: Pull, _):
         taken = (looked_at[0].depth.stamp[0] - pull.recording.depth.stamp[0]) * 1e-9
         low, high = (bound - taken for bound in window)
-        return ReleasePictures(low, high, low + 0.015, high, (), (), ())
+        return ReleasePictures(low, high, low + 0.015, high, (), ())
 
     def by_hand(pull: Pull):
         """The camera goes with the pose that was recorded."""

@@ -9,8 +9,8 @@ the returned share, a coordinate of the density.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,15 +41,10 @@ class Observed:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Launches of one band, and what launches them.
-
-    Attributes:
-        made_with: The settings that `setup` comes from, by their keys in params.yaml.
-    """
+    """Launches of one band, and what launches them."""
 
     launches: Sequence[Observed]
     setup: LaunchSetup
-    made_with: Mapping[str, float | None] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -174,13 +174,13 @@ def test_a_launch_is_held_against_what_all_else_predicts() -> None:
 @pytest.mark.parametrize(
     ("draw", "error", "landing", "words"),
     [
-        ((-0.3, -0.1), 0.001, 195, "launch: landing_y_m must lie between 0 and 20 m"),
-        ((0.3, -0.1), 0.001, 1.9, "launch: draw_y_m must lie between -20 and 0 m"),
-        ((-0.3, -0.1), -1.0, 1.9, "error: must be from 0 to 1 m"),
-        ((-0.3, float("nan")), 0.001, 1.9, "draw_z_m"),
-        ((0.0, -0.1), 0.001, 1.9, "draw_y_m"),
-        ((-0.3, -0.1), 0.001, 0.0, "landing_y_m"),
-        ((-0.3, -0.1), 0.001, "far", "landing_y_m must be a number of metres, got 'far'"),
+        ((-0.3, -0.1), 0.001, 195, "launch: landing must lie from 0 to 20 m"),
+        ((0.3, -0.1), 0.001, 1.9, "launch: draw_y must lie from -20 to 0 m"),
+        ((-0.3, -0.1), -1.0, 1.9, "launch: error must lie from 0 to 0.1 m"),
+        ((-0.3, float("nan")), 0.001, 1.9, "draw_z must lie"),
+        ((0.0, -0.1), 0.001, 1.9, "draw_y must lie"),
+        ((-0.3, -0.1), 0.001, 0.0, "landing must lie"),
+        ((-0.3, -0.1), 0.001, "far", "landing must lie from 0 to 20 m .*, got far"),
     ],
 )
 def test_no_launch_has_such_a_value(draw, error, landing, words) -> None:

@@ -2,7 +2,7 @@
 
     python tools/hero.py band2    # from a run's data; writes docs/hero.webp
 
-First the recorded pull of BAND_dip beside its simulation; then its release, 50 times slower, paused
+First the pull with dips of BAND beside its simulation; then its release, 50 times slower, paused
 at each picture of the camera; then virtual launches at one target by this project's method and by
 the paper's, which has BAND's recording without a dip, with the predicted 90 % intervals.
 """
@@ -20,17 +20,19 @@ from PIL import Image, ImageDraw
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
+from pipeline.band_folder import identified  # noqa: E402
+from pipeline.layout import Layout  # noqa: E402
 from pipeline.params import load  # noqa: E402
+from pipeline.params.run import Pair  # noqa: E402
 from sling2sim2real.base import errors  # noqa: E402
 from sling2sim2real.base.errors import UserError  # noqa: E402
-from sling2sim2real.base.layout import Layout, made  # noqa: E402
+from sling2sim2real.base.layout import made  # noqa: E402
 from sling2sim2real.card import animation  # noqa: E402
 from sling2sim2real.card.animation import Frame, ReleaseFrames, font, save  # noqa: E402
 from sling2sim2real.card.camera import Pictures  # noqa: E402
 from sling2sim2real.card.simulated import simulate  # noqa: E402
 from sling2sim2real.drawing.styles import INK  # noqa: E402
 from sling2sim2real.episode.episode import Episode  # noqa: E402
-from sling2sim2real.identification.results.theta import load_theta  # noqa: E402
 
 PAGE = ROOT / "docs" / "hero.webp"
 OURS, PAPER = "posterior", "paper"
@@ -103,15 +105,13 @@ class LaunchRow:
         draw.text((10, self.top + 28), text, fill=INK, font=font(14))
 
 
-def recorded(band: str) -> list[Frame]:
+def recorded(pair: Pair) -> list[Frame]:
     """The pull, and its release."""
     params, layout = load(ROOT / "params.yaml"), Layout(ROOT)
-    episode = Episode.load_all(layout.episodes(band))[0]
-    theta = load_theta(layout.theta(band, OURS), band)
-    pictures = Pictures.of(
-        layout.raw(band) / episode.metadata["input"]["file"], episode, params.setup
-    )
-    simulated = simulate(params, band, OURS, episode, theta)
+    episode = Episode.load(layout.episode(pair))
+    recording = layout.raw(pair) / episode.metadata["input"]["file"]
+    pictures = Pictures.of(recording, episode, params.setup)
+    simulated = simulate(identified(pair, ROOT), episode)
     begin, release = episode.grasp_time, simulated.release
     shown = episode, simulated, pictures, params.setup.fork_width, begin
     frames = ReleaseFrames(*shown)
@@ -128,14 +128,14 @@ def launched(band: str) -> list[Frame]:
     params, layout = load(ROOT / "params.yaml"), Layout(ROOT)
     floor, target = -params.setup.fork_height, params.trials.targets[1]
     rows = []
-    for title, color, name, method in (
-        ("this project, from one pull with dips", OUR, f"{band}_dip", OURS),
-        ("the paper's method, from the paper's pull", THEIR, band, PAPER),
+    for title, color, key in (
+        ("this project, from one pull with dips", OUR, f"{band}-dips-{OURS}"),
+        ("the paper's method, from the paper's pull", THEIR, f"{band}-{PAPER}"),
     ):
-        trials = pd.read_parquet(made(layout.trials(name, method)))
+        trials = pd.read_parquet(made(layout.trials(params.run.pairs[key])))
         trials = trials[trials.target == target]
         if any(way is None for way in trials.flight_y):
-            raise UserError(f"{name}: launches at {target:g} m did not fly; name another band")
+            raise UserError(f"{key}: launches at {target:g} m did not fly; name another band")
         rows.append(LaunchRow(title, color, len(rows) * ROW, floor, target, trials))
     frames = []
     for part in (0, *np.linspace(0.05, 0.975, 24), 1):
@@ -150,7 +150,8 @@ def main() -> None:
     if len(sys.argv) != 2:
         raise UserError("usage: python tools/hero.py BAND")
     band = sys.argv[1]
-    frames = [*recorded(f"{band}_dip"), *launched(band)]
+    pair = load(ROOT / "params.yaml").run.pairs[f"{band}-dips-{OURS}"]
+    frames = [*recorded(pair), *launched(band)]
     save(PAGE, frames, QUALITY)
     print(f"{PAGE}: {len(frames)} frames, {sum(shown for _, shown in frames) / 1000:.1f} s")
 

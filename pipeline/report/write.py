@@ -20,7 +20,7 @@ from sling2sim2real.drawing.page import page
 # The chapters of each page: each makes its text of a Report, and writes what the text shows.
 PAGES = {"README": (outcome, paper_tables, evaluation), "appendix": (appendix,)}
 HTML = {"README": "index", "appendix": "appendix"}  # names of pages
-LINK = re.compile(rf"\]\(((?:bands/[^)/]+/)?)({'|'.join(HTML)})\.md\)")
+LINK = re.compile(rf"\]\(((?:bands/[^)/]+/card/)?)({'|'.join(HTML)})\.md\)")
 RUN = """\
 <p id="run"></p>
 <script src="run.js"></script>

@@ -30,7 +30,7 @@ REPORT = Path("reports/benchmarks/times.json")
 BAND = "timed"  # of the recording
 DEMO = (  # `make demo` in a clone of its own, where nothing has run
     "clone=$PWD && rm -rf ../demo && git clone -q . ../demo && cd ../demo"
-    ' && PATH="$clone/.venv/bin:$PATH" sling fit --name band1_dip'
+    ' && ln -s "$clone/.venv" .venv && make demo'
 )
 CHANGES = ("PYTHONPATH", "VIRTUAL_ENV", "UV_CACHE_DIR", "PIP_CACHE_DIR", "WARP_CACHE_PATH")
 
@@ -56,9 +56,9 @@ class MeasuredStep:
 
 def steps(recording: Path, mass: float) -> list[MeasuredStep]:
     """All steps, in their order; each needs those before it."""
-    sling, mine, draw = ".venv/bin/sling", ("--band", "band1"), "--draw=-0.30,-0.15"
-    aim = (sling, "aim", *mine, "--target", "1.925", "--force")
-    observe = (sling, "observe", *mine, draw, "--landing", "1.85")
+    sling, mine, draw = ".venv/bin/sling", f"bands/{BAND}", "--draw=-0.30,-0.15"
+    aim = (sling, "aim", "reports/bands/band1", "--target", "1.925", "--force")
+    observe = (sling, "observe", mine, draw, "--landing", "1.85")
     fit = (sling, "fit", str(recording.resolve()), "--mass", f"{mass:g}", "--name", BAND)
     made = ("data", ".dvc/cache")
     rows = [
@@ -66,13 +66,13 @@ def steps(recording: Path, mass: float) -> list[MeasuredStep]:
         ("run", "`make run`, after set-up", ("make", "run"), "[1-9][0-9]* ran", made),
         ("again", "`sling flow`, nothing stale", (sling, "flow")),
         ("aim", "`sling aim`", aim),
-        ("launch", "`sling launch`", (sling, "launch", *mine, draw)),
-        ("observe", "`sling observe`", observe),
+        ("launch", "`sling launch`", (sling, "launch", "reports/bands/band1", draw)),
         ("demo", "`make demo`, after set-up", ("sh", "-c", DEMO)),
         ("test", "`make test`, after set-up", ("make", "test"), "[0-9] passed"),
         ("test-all", "`make test-all`", ("make", "test-all"), "[0-9] passed"),
         ("check", "`sling check`", (sling, "check", str(recording.resolve()))),
         ("fit", "`sling fit`", fit),
+        ("observe", "`sling observe`", observe),
     ]
     return [MeasuredStep(*cells) for cells in rows]
 

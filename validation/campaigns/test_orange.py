@@ -15,7 +15,6 @@ import pytest
 from pipeline.params import load
 from pipeline.report.tables.landings import prediction_error
 from sling2sim2real.base.code import ROOT
-from sling2sim2real.base.layout import Layout
 from validation.campaigns.runner import OURS
 from validation.projects import ProjectCopy, copy_project
 
@@ -55,8 +54,9 @@ def test_landings_are_predicted_within_the_recorded_stretch(
 ) -> None:
     run, methods = copy_of_the_project(tmp_path / "project"), params.run.methods
     project, table = run.folder, run.folder / "params.yaml"
-    Layout(project).raw(BAND).mkdir(parents=True)
-    shutil.copy(RECORDING, Layout(project).raw(BAND))
+    raw = project / "data/raw" / BAND / "plain"
+    raw.mkdir(parents=True)
+    shutil.copy(RECORDING, raw)
     sizes = {"source": "recording", "mass": MASS, "diameter": 0.010, "rest_length": 0.52}
     run.set({f"bands.{BAND}": sizes, "run.bands": [*load(table).run.bands, BAND]})
     # the note says where the hand was, not where it was sent

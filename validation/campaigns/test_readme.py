@@ -1,6 +1,7 @@
 """README, typed word for word: its commands after the demo, and its Python."""
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -20,9 +21,10 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> ProjectCopy:
     copy = ProjectCopy(folder)
     copy("git", "init", "-q")
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    demo = re.search(r"^demo:.*\n(?:\t@(?:echo|printf).*\n)*\t@.*(sling fit .*)$", makefile, re.M)
-    assert demo
-    copy("bash", "-ec", demo[1])
+    recording = re.search(r"^DEMO = (.*)$", makefile, re.M)
+    assert recording
+    copy("python", "-m", "stages.record", Path(recording[1]).stem)
+    copy("sling", "fit", recording[1], "--mass", "0.023", "--name", "mine")
     return copy
 
 
@@ -34,12 +36,12 @@ def blocks(language: str) -> str:
 
 def test_commands_run_as_they_are_written(project: ProjectCopy, progress) -> None:
     lines = [line for line in blocks("bash").splitlines() if line.startswith("sling ")]
-    assert len(lines) >= 8
+    assert len(lines) >= 7
     for line in lines:
         progress(line)
         assert project("bash", "-ec", line).strip()
     assert (project.folder / "sheet.png").is_file()
-    assert not (project.folder / "data/raw/mine").exists()  # the last one removes it
+    assert (project.folder / "bands/mine/exports/mjcf/card.json").is_file()
 
 
 def test_the_python_runs(project: ProjectCopy) -> None:

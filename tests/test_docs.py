@@ -230,8 +230,8 @@ def imported(node: ast.AST) -> list[tuple[str, str]]:
 
 def test_what_commands_say_is_quoted_as_they_say_it() -> None:
     """Each piece of a line that docs/faq.md quotes stands in the code."""
-    places = "sling2sim2real/recording", "sling2sim2real/episode", "sling2sim2real/cli", "stages"
-    folders = [ROOT / place for place in places]
+    places = "recording", "episode", "api", "cli"
+    folders = [ROOT / "stages", *(ROOT / "sling2sim2real" / place for place in places)]
     files = sorted(file for folder in folders for file in folder.rglob("*.py"))
     code = "\n".join(file.read_text(encoding="utf-8") for file in files)
     message = re.sub(r'"\s*\n\s*f?"', "", code)  # strings that go on in the next line

@@ -1,7 +1,7 @@
 """Have a Franka do what `sling plan` or `sling aim` says, by franky (pip install franky-control).
 
-    python execute.py data/plans/my --robot 172.16.0.2
-    python execute.py data/plans/my --aim aim.json --robot 172.16.0.2
+    python execute.py plan --robot 172.16.0.2
+    python execute.py plan --aim aim.json --robot 172.16.0.2
 
 The first pulls a band for its recording: trajectory.csv, phase by phase. The second launches: it
 grasps and lifts as in the plan, and draws to the pose of `sling aim --json`. Without --robot it

@@ -1,7 +1,7 @@
 """Try execute.py on a simulated Franka: pip install franky-control franky-sim, in an environment
 of its own.
 
-    python simulated.py data/plans/my [--aim aim.json]
+    python simulated.py plan [--aim aim.json]
 
 MuJoCo moves the arm; there is no band. Beside what execute.py prints, it prints one JSON line: what
 the simulator itself says of where the hand came to rest, and of its fingers.

@@ -32,6 +32,7 @@ SEARCH = {
     PAPER: ["history", "clusters", "cma"],
     BO: ["search"],
 }
+FOLDER = "reports/bands/band1"
 LAUNCH = "-0.3,-0.17,,2.0,fit\n"
 
 
@@ -190,7 +191,8 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
 
 def test_the_python_of_the_readme_runs(project: Copy) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    code = text.split("```python\n")[1].split("```")[0].replace("band1_dip", "band1")
+    code = text.split("```python\n")[1].split("```")[0]
+    code = re.sub(r'Identification\.\w+\("[^"]+"\)', f"Identification.load('{FOLDER}')", code)
     message = project("python", "-c", code).splitlines()
     assert " Pa, 90 % interval " in message[0]
     assert float(message[1]) > 0 and len(message[2].strip("()").split(",")) == 2
@@ -201,8 +203,8 @@ def test_python_identifies_what_the_stage_does(project: Copy) -> None:
     code = """
 from pathlib import Path
 import sling2sim2real as s2s
-run = s2s.Identification.of_run("band1")
-episode = s2s.Episode.load(Path("data/episodes/band1/1"))
+run = s2s.Identification.load("reports/bands/band1")
+episode = s2s.Episode.load(Path("data/episodes/band1/plain/1"))
 error = run.settings.trials.actuation_error
 seen = s2s.Observed((-0.3, -0.17), error, 2.0)
 found = s2s.identify([episode], run.band, launches=[seen], settings=run.settings)

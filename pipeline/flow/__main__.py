@@ -41,7 +41,8 @@ def parser() -> Parser:
 
 def main() -> None:
     given, root = parser().parse_args(), Path.cwd()
-    load()  # a mistake in params.yaml is reported once, and not by each stage
+    if (root / "params.yaml").exists():
+        load()  # a mistake is reported once, and not by each stage
     expect_ready(root)
     graph = dvc.stale(root, given.targets)
     if not graph:

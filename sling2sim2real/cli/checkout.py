@@ -22,7 +22,7 @@ def run(command: str, arguments: Sequence[str], start: Path | None = None) -> No
     """Become that module's process. Raises UserError outside of a checkout."""
     start = start or Path.cwd()
     for folder in (start, *start.parents):
-        if (folder / "dvc.yaml").is_file() and (folder / "params.yaml").is_file():
+        if (folder / "dvc.yaml").is_file():
             os.chdir(folder)
             module, _ = COMMANDS[command]
             os.execv(sys.executable, [sys.executable, "-m", module, *arguments])

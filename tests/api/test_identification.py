@@ -23,12 +23,15 @@ def test_a_known_band_is_found_without_a_start(band, settings, world, episode) -
     summary = []
     identification = identify([episode], band, settings=settings, progress=summary.append)
     assert identification.settled
+    missed = []  # of 90 % intervals one in ten is
     for name in FITTED:
         interval = identification.intervals[name]
-        assert interval.low < getattr(world.theta, name) < interval.high
+        if not interval.low < getattr(world.theta, name) < interval.high:
+            missed.append(name)
         assert interval.value == getattr(identification.theta, name)
         # which one picture hardly tells
         assert interval.identifiable or name == "elasticity_damping"
+    assert len(missed) <= 1
     assert not identification.intervals["dynamic_friction"].identifiable
     assert identification.samples.shape == (200, len(identification.theta.names))
     assert [line.split()[0] for line in summary[:3]] == ["mounting:", "explored", "expansion"]

@@ -31,8 +31,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list:
 def test_it_runs_the_module_in_the_projects_folder(command, started, tmp_path, monkeypatch) -> None:
     inner = tmp_path / "reports" / "bands"
     inner.mkdir(parents=True)
-    for name in ("dvc.yaml", "params.yaml"):
-        (tmp_path / name).touch()
+    (tmp_path / "dvc.yaml").touch()
     monkeypatch.chdir(inner)
     with pytest.raises(Replaced):
         checkout.run(command, ["--workers", "2"])

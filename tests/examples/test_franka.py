@@ -19,9 +19,11 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from pipeline.params import load
+from sling2sim2real import Band
 from sling2sim2real.cli.plan.plan import Plan, plan_recording
 from tests.project import DEFAULTS, ROOT, with_
 
+BAND = Band(mass=0.023, diameter=0.010, rest_length=0.52, name="band1")
 FOLDER = ROOT / "examples" / "franka"
 FORK = (0.75, 0.0, 0.70, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)
 DRAW = (-0.32, -0.05)
@@ -45,7 +47,7 @@ def execute():
 def planned(tmp_path_factory) -> tuple[Path, Plan]:
     folder = tmp_path_factory.mktemp("franka")
     params = with_(load(DEFAULTS), "setup", base_to_fork=FORK)
-    plan = plan_recording(params, "band1", draw=DRAW, root=folder)
+    plan = plan_recording(params, BAND, draw=DRAW)
     plan.write(folder / "plan", 100.0)
     return folder / "plan", plan
 
@@ -160,7 +162,7 @@ def test_an_aim_that_cannot_be_done_moves_nothing(
 
 def test_another_frame_or_gripper_moves_nothing(execute, planned, monkeypatch, tmp_path, capsys):
     params = load(DEFAULTS)
-    plan_recording(params, "band1", root=tmp_path).write(tmp_path / "o", 50.0)
+    plan_recording(params, BAND).write(tmp_path / "o", 50.0)
     shutil.copytree(planned[0], tmp_path / "gap")
     text = (tmp_path / "gap/gripper.json").read_text().replace("0.04", "0.08")
     (tmp_path / "gap/gripper.json").write_text(text)

@@ -12,6 +12,8 @@ from pathlib import Path
 import psutil
 from ruamel.yaml import YAML
 
+from tests.project import ROOT
+
 BIN = Path(sys.executable).parent
 # Waits until another stage is at work too: two such stages end only side by side.
 MEET = "touch {0}.here; for i in $(seq 600); do [ -e {1}.here ] && break; sleep 0.1; done"
@@ -39,7 +41,8 @@ class Toy:
         """Ours, with this Python's commands first and two cores."""
         foreign = [name for name in os.environ if name.startswith(("PREFECT", "SLING", "DVC"))]
         kept = {name: text for name, text in os.environ.items() if name not in foreign}
-        return kept | {"PATH": f"{BIN}:{kept['PATH']}", "SLING_WORKERS": "2"} | more
+        ours = {"PATH": f"{BIN}:{kept['PATH']}", "PYTHONPATH": str(ROOT), "SLING_WORKERS": "2"}
+        return kept | ours | more
 
     def start(self, *command: str, **environment: str) -> subprocess.Popen:
         """Start a command, its output together."""

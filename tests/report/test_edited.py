@@ -6,14 +6,14 @@ import pytest
 
 from pipeline.report import write as writing
 from tests.edited import outcomes
-from tests.report.conftest import BAND, METHOD
+from tests.report.conftest import PAIR
 
 pytestmark = pytest.mark.slow
 
 FILES = {
-    "theta": f"data/theta/{BAND}/{METHOD}.json",
-    "regions": f"data/clusters/{BAND}/{METHOD}.json",
-    "policy": f"data/policies/{BAND}/{METHOD}/card.json",
+    "theta": f"data/theta/{PAIR}.json",
+    "regions": f"data/clusters/{PAIR}.json",
+    "policy": f"data/policies/{PAIR}/card.json",
 }
 
 

@@ -4,21 +4,17 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
-from ruamel.yaml import YAML
 
 from rig.recorder.interaction import Interaction
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.recording.build import build_episodes
 from sling2sim2real.simulator.model import ClampedBand
-from tests.project import ROOT
+from tools.closure import stages
 
-STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
-WORLD = {"record", "dip_record", "launches", "ablation_launches", "dip_launches", "floor"}
-CARDS = {"card", "own_card", "dip_card"}
-SHOWN = ("data/trials/$", "data/floor")  # what came of launches on the rig
-RECORDS = {"record", "dip_record"}
-TRIALS = {"trials", "ablation_trials", "own_trials", "dip_trials"}
-JUDGES = WORLD - RECORDS | TRIALS | {"report", *CARDS}
+STAGES = stages()
+WORLD = {"record", "trials", "floor"}
+SHOWN = ("data/trials", "data/floor")  # what came of launches on the rig
+JUDGES = {"trials", "report", "card"}
 
 
 class Hidden:
@@ -47,10 +43,9 @@ def test_no_launch_reaches_what_is_identified() -> None:
     """Landings go to report and cards alone, and a stage reads raw recordings, not the truth."""
     for name, stage in STAGES.items():
         data = [dep for dep in stage["deps"] if dep.startswith("data/")]
-        assert name in {"report", *CARDS} or not any(dep.startswith(SHOWN) for dep in data)
-        # Beside a policy lie its launches on the rig.
+        assert name in {"report", "card"} or not any(dep.startswith(SHOWN) for dep in data)
         assert name in JUDGES or not any(dep.startswith("data/policies") for dep in data)
-        assert name not in RECORDS or not data
+        assert name != "record" or not data
 
 
 def test_a_recording_holds_no_truth(recorded: tuple[Path, Interaction]) -> None:

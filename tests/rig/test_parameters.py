@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 
-from pipeline.params import Params, Section
+from pipeline.params import Params
 from pipeline.params.virtual_rig import RigFlow, RigSoftening, RigSpectrum
 from rig.physics import motion
 from rig.physics.launch import launch
 from rig.recorder import camera, record
+from sling2sim2real.base.schema import Section
 from sling2sim2real.settings.lab import Dip
 from tests.project import with_
 
@@ -155,8 +156,8 @@ def rough(params: Params) -> Params:
     bands = {"band1": params.rig.bands["band1"].model_copy(update=RUBBER)}
     eyes = {"drop_rate": 0.3, "dropout": 0.01}
     camera = params.rig.camera.model_copy(update=eyes)
-    values = {"edges": 8, "tolerance": 1e-2, "draws": {}, "camera": camera, "bands": bands}
-    return with_(params, "rig", **values)
+    values = {"edges": 8, "tolerance": 1e-2, "draws": {}, "launch_draws": {}}
+    return with_(params, "rig", camera=camera, bands=bands, **values)
 
 
 @pytest.mark.slow

@@ -19,16 +19,16 @@ from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-BUDGETS = {  # what was reached on 2026-11-28, plus 2 %; the whole is as asked
-    "pipeline": 4_000,
-    "sling2sim2real": 22_500,
-    "stages": 551,
+BUDGETS = {  # what was reached on 2026-11-28, plus 2 %; the whole too
+    "pipeline": 3_270,
+    "sling2sim2real": 22_050,
+    "stages": 495,
     "rig": 1_940,
-    "validation": 7_210,
-    "tests": 21_490,
-    "tools": 551,
+    "validation": 6_980,
+    "tests": 20_370,
+    "tools": 540,
     "examples": 525,
-    "all": 57_940,
+    "all": 56_180,
 }
 COMMENTS = {  # by suffix: what is no code
     ".h": re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL),

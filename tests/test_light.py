@@ -24,20 +24,33 @@ class Absent:
         if name.partition(".")[0] in absent:
             raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 sys.meta_path.insert(0, Absent())
+"""
+COMMAND = """
 import sling2sim2real as s2s
 [getattr(s2s, name) for name in s2s.__all__]
 from sling2sim2real.cli.cli import main
 sys.argv = ["sling", *{words!r}]
 main()
 """
+SERVER = """
+from pathlib import Path
+from pipeline.flow import server
+from sling2sim2real.base import errors
+errors.run(lambda: server.serve(Path.cwd()))
+"""
 
 
-def light(folder: Path, *words: str) -> subprocess.CompletedProcess:
-    """`sling` in a folder, by a Python without what the extra `run` brings."""
-    script = LIGHT.format(absent=EXTRAS["run"].split(), words=words)
+def light(folder: Path, code: str) -> subprocess.CompletedProcess:
+    """Code in a folder, by a Python without what the extra `run` brings."""
+    script = LIGHT.format(absent=EXTRAS["run"].split()) + code
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-c", script]
     return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True)
+
+
+def sling(folder: Path, *words: str) -> subprocess.CompletedProcess:
+    """A command in a folder, by that Python."""
+    return light(folder, COMMAND.format(words=words))
 
 
 def test_the_messages_know_what_the_extra_brings() -> None:
@@ -50,14 +63,8 @@ def test_the_messages_know_what_the_extra_brings() -> None:
 @pytest.mark.slow
 def test_a_light_install_suffices_and_says_what_it_lacks(tmp_path: Path) -> None:
     how = "make setup, or pip install '.[run]' -c constraints.txt in the project's folder"
-    assert light(ROOT, "--help").returncode == 0
-    assert light(tmp_path, "check", "no.mcap").stderr.endswith("error: no.mcap: no such file\n")
-    asked = subprocess.run(
-        [sys.executable, "-c", LIGHT.partition("import sling2sim2real")[0].format(
-            absent=EXTRAS["run"].split()) + "from pipeline.flow import server\n"
-            "from sling2sim2real.base.errors import run\nrun(lambda: server.serve(__import__"
-            "('pathlib').Path.cwd()))"],
-        cwd=ROOT, capture_output=True, text=True,
-    )  # fmt: skip
-    assert asked.returncode == 1
-    assert re.fullmatch(rf"error: \w+ is not installed: {re.escape(how)}\n", asked.stderr)
+    assert sling(ROOT, "--help").returncode == 0
+    assert sling(tmp_path, "check", "no.mcap").stderr.endswith("error: no.mcap: no such file\n")
+    lacking = light(ROOT, SERVER)
+    assert lacking.returncode == 1
+    assert re.fullmatch(rf"error: \w+ is not installed: {re.escape(how)}\n", lacking.stderr)

@@ -27,7 +27,7 @@ REPORT = "reports/validation/export-{}.json"
 TARGETS = {  # packages (Newton's match is MuJoCo's), and the command's arguments
     "mjcf": (("mujoco",), ""),
     "newton": (("newton", "mujoco"), "--to newton"),
-    "usd": ((), "--to usd band1_dip band2_dip band3_dip"),
+    "usd": ((), "--to usd band1-dips band2-dips band3-dips"),
 }
 KEPT = "met engine proof matched time_step_s time_step_error springs_error pull match on_paper"
 KEPT = (*KEPT.split(), "factor_on_youngs_modulus", "factor_on_mass", "factor_on_rest_length")
@@ -37,7 +37,7 @@ def main() -> None:
     """Export, replay, write. Raises UserError."""
     parser = argparse.ArgumentParser(prog="python -m validation.exports")
     parser.add_argument("--to", choices=TARGETS, default="mjcf")
-    parser.add_argument("bands", nargs="*", metavar="BAND")
+    parser.add_argument("bands", nargs="*", metavar="RECORDING")
     args, cards = parser.parse_args(), {}
     target, (packages, arguments) = args.to, TARGETS[args.to]
     device = {"mjcf": "cpu", "newton": devices()[0], "usd": "cuda:0"}[target]
@@ -57,10 +57,12 @@ def main() -> None:
 
 
 def exported(target: str, band: str) -> dict:
-    """The card of a band that is exported and replayed. Raises UserError."""
+    """The card of a recording's band, exported and replayed. Raises UserError."""
     with tempfile.TemporaryDirectory() as folder:
         run = load().run
-        pair = run.pairs[f"{run.first[band].key}-{run.main}"]
+        if band not in run.recordings:
+            raise UserError(f"{band}: params.yaml records {', '.join(run.recordings)}")
+        pair = run.pairs[f"{band}-{run.main}"]
         model, episode = identified(pair), Episode.load(Layout().episode(pair))
         card = export(model, target, folder, episode=episode).card
     if "met" not in card:

@@ -162,7 +162,7 @@ class _Mcap:
         self.read, self.first, self.last = 0, 0, 0
         self.checked = ended = False
         self.stopped = ""
-        with suppress(*DAMAGE, OSError):  # the end repeats what the first chunk says, which may be damaged
+        with suppress(*DAMAGE, OSError):  # the end repeats what a damaged chunk may have said
             if summary := make_reader(file, validate_crcs=True).get_summary():
                 self.schemas |= summary.schemas
                 self.channels |= summary.channels

@@ -84,7 +84,7 @@ def built_once(build: Callable[..., Built]) -> Callable[..., Built]:
     return built
 
 
-def empty(size: int, dtype: Any, device: str) -> wp.array:
+def empty(size: int | tuple[int, ...], dtype: Any, device: str) -> wp.array:
     """An array for results there."""
     return wp.empty(size, dtype=dtype, device=device)
 

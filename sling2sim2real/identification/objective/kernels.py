@@ -3,7 +3,7 @@
 # Warp's annotations are values, and what its decorators give is no function any more:
 # pyright: reportInvalidTypeForm=false, reportGeneralTypeIssues=false, reportReturnType=false
 # pyright: reportArgumentType=false, reportOperatorIssue=false, reportIndexIssue=false
-# pyright: reportCallIssue=false
+# pyright: reportCallIssue=false, reportAssignmentType=false
 
 import math
 from pathlib import Path

@@ -380,12 +380,7 @@ def read_calibration(message: Message) -> Reading:
     distortion = np.array(first_of(message, "d", "D"), float).ravel()
     frame = frame_of(message)
     camera = Camera(int(message.width), int(message.height), matrix, distortion, frame)
-    across, down = (max(1, int(getattr(message, f"binning_{axis}", 1))) for axis in "xy")
-    roi = getattr(message, "roi", None)
-    sides = (roi.x_offset, roi.y_offset, roi.width, roi.height) if roi else (0, 0, 0, 0)
-    x, y, width, height = map(int, sides)
-    model = str(message.distortion_model)
-    value = Calibration(camera, model, rectified, (across, down), (x, y, width, height))
+    value = Calibration(camera, str(message.distortion_model), rectified)
     return _reading(message, value)
 
 

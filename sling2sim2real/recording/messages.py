@@ -58,7 +58,10 @@ class Spool:
         """Keep some bytes; what gives them back."""
         place, self._size = self._size, self._size + len(data)
         self._file.write(data.data)
-        return lambda: np.frombuffer(os.pread(self._file.fileno(), len(data), place), np.uint8)
+        return partial(self._get, place, len(data))
+
+    def _get(self, place: int, size: int) -> np.ndarray:
+        return np.frombuffer(os.pread(self._file.fileno(), size, place), np.uint8)
 
 
 class Unreadable(str):

@@ -10,7 +10,7 @@ import pytest
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.phases import phases
 from sling2sim2real.recording.build import episode_of, process_recording
-from sling2sim2real.recording.release import find_release, find_releases
+from sling2sim2real.recording.events import find_release, find_releases
 from tests.project import with_
 from tests.recording.conftest import written
 from validation.recordings.bag import Truth

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.grasp import find_grasp
-from sling2sim2real.recording.release import find_release, find_releases
+from sling2sim2real.recording.events import find_grasp, find_release, find_releases
 
 DIRECTION = np.array([0.3, -0.8, 0.52])
 

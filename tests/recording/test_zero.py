@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from sling2sim2real.recording.zero import drift_of, zeroed
 
 T = np.arange(10_000) / 1000

@@ -80,6 +80,10 @@ class Layout:
         """The best parameters."""
         return self.data / "theta" / f"{pair.key}.json"
 
+    def metrics(self, pair: Pair) -> Path:
+        """Its loss and stiffness, for `dvc metrics diff` and `dvc exp show`."""
+        return self.root / "reports" / "theta" / f"{pair.key}.json"
+
     def policy(self, pair: Pair) -> Path:
         """Folder of a policy's files."""
         return self.data / "policies" / pair.key

@@ -21,11 +21,11 @@ THEME = {
     "legend.frameon": False,
     "figure.constrained_layout.use": True,
 }
-# Red is ours, teal the paper's, blue to violet its ablations, yellow to brown other optimisers,
-# green the geometry-only baselines. Names are the paper's where the methods are.
+# Red is the posterior, teal the paper's method, blue to violet its ablations, yellow to brown other
+# optimisers, green the geometry-only baselines. Ablations and optimisers have the paper's names.
 KNOWN = {
-    "posterior": ("ours", "#d1495b"),
-    "paper": ("Sling2Sim2Real", "#00798c"),
+    "posterior": ("posterior", "#d1495b"),
+    "paper": ("paper", "#00798c"),
     "no_covariance": ("−c", "#3a5ba0"),
     "no_multistart": ("−m", "#6f9bd8"),
     "no_covariance_no_multistart": ("−c, −m", "#8d6a9f"),

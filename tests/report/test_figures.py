@@ -63,7 +63,7 @@ def test_every_launch_lies_as_far_off_as_it_landed(retained) -> None:
     (floor,) = first.patches
     np.testing.assert_allclose([floor.get_x(), floor.get_width()], [-2, 4])
     names = [label.get_text() for label in first.get_yticklabels()]
-    assert names == ["Sling2Sim2Real", "DE_L"]
+    assert names == ["paper", "DE_L"]
     assert {"measured (hollow)", "aimed at 1.725 m"} <= set(words(retained[0]))
 
 

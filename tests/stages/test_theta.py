@@ -44,6 +44,10 @@ def test_what_a_method_leaves_out_is_left_out_everywhere(
         assert not ended.value.code
     path = layout.theta(pair)
     saved = load_theta(path, "band1")
+    shown = json.loads(layout.metrics(pair).read_text())[pair.key]  # of `dvc metrics diff`
+    assert shown["E_kPa"] == pytest.approx(1e-3 * saved["theta"]["youngs_modulus"], rel=1e-3)
+    terms = (saved["loss"][term] for term in ("geom", "force", "work"))
+    assert shown["loss"] == pytest.approx(sum(terms), rel=1e-3)
     assert json.loads(path.read_text()).get("mounted") == (None if mounting else False)
     sling = calibrated(params, "band1", saved, layout.clamps(pair))
     assert (sling.flexural_rigidity == 2e-3) == mounting

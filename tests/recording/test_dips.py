@@ -75,7 +75,7 @@ def test_it_is_one_pull_whose_events_are_found(done) -> None:
     signals = pull.signals
     assert pull.whole.start + signals.release_time == pytest.approx(truth.release, abs=1e-3)
     assert pull.whole.start + signals.grasp_time == pytest.approx(truth.grasp, abs=0.021)
-    assert not signals.facts.slips and not signals.facts.zeroed
+    assert not signals.facts.slips
 
 
 def test_the_window_follows_the_interaction(done, params) -> None:

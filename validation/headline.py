@@ -94,7 +94,7 @@ def table(usual: dict, large: dict, by_dips: dict[str, np.ndarray]) -> list[str]
 
 
 def differences(usual: dict, large: dict) -> str:
-    """How `posterior` by the paper's pull compares with the paper's method on the same recordings."""
+    """How `posterior` by the paper's pull compares with the paper's method, by recording."""
     parts = []
     for content in (usual, large):
         theirs, ours = each_of(content, PAPER), each_of(usual, OURS)

@@ -24,8 +24,9 @@ def main() -> None:
     recorded = pair.band, pair.method, episode, layout.clamps(pair)
     evaluate = logging_evaluator(f"search-{pair.key}", params, *recorded, rollouts)
     explore(params, pair.method, evaluate).save(layout.evaluations(pair))
-    entries = law_entries(episode, params.methods[pair.method].law)
-    save_confidence(layout.confidence(pair), pair.band, entries)
+    method = params.methods[pair.method]
+    entries = law_entries(episode, method.law)
+    save_confidence(layout.confidence(pair), pair.band, entries, mounting=method.mounting)
 
 
 if __name__ == "__main__":

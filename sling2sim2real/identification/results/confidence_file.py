@@ -21,9 +21,11 @@ class ConfidenceFile(PosteriorFile):
 
 
 def save_confidence(
-    path: Path, band: str, entries: dict, samples: Parameters | None = None
+    path: Path, band: str, entries: dict, samples: Parameters | None = None, *, mounting: bool
 ) -> None:
-    """Write a `ConfidenceFile`."""
+    """Write a `ConfidenceFile`; without `mounting` the clamps were left as `setup` says."""
+    if not mounting:
+        entries = entries | {"mounted": False}
     names, values = ([], []) if samples is None else ([*samples.names], samples.values.tolist())
     content = {"band": band, "names": names, "samples": values, "estimate": entries}
     write_json(path, content)

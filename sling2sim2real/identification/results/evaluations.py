@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pyarrow.compute import equal
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.files import read_table, replacing
+from sling2sim2real.base.files import column, read_table, replacing
 from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.parameters import Parameters
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from sling2sim2real.identification.objective.evaluate import Evaluation
 
 TERMS = ("geom", "force", "work")  # of the paper's loss
+UNIT = "unit_"  # before the name of an axis: its coordinate in the unit cube
 
 
 @dataclass
@@ -51,7 +53,7 @@ class Evaluations:
             "generation": pa.array([generation] * count, pa.int32()),
             "solver": pa.array([None] * count if solver is None else solver, pa.int32()),
         }
-        for prefix, values in (("unit_", evaluation.unit), ("", evaluation.theta)):
+        for prefix, values in ((UNIT, evaluation.unit), ("", evaluation.theta)):
             for name, column in zip(self.names, values.T, strict=True):
                 columns[prefix + name] = pa.array(column, pa.float64())
         for name in TERMS:
@@ -74,21 +76,23 @@ class Evaluations:
     @property
     def unit(self) -> np.ndarray:
         """Shape (N, D)."""
-        return np.stack([self.table[f"unit_{name}"].to_numpy() for name in self.names], axis=1)
+        return np.stack([column(self.table, UNIT + name) for name in self.names], axis=1)
 
     @property
     def total(self) -> np.ndarray:
         """Shape (N,); +inf where failed."""
-        return self.table["total"].to_numpy()
+        return column(self.table, "total")
 
     def save(self, path: Path) -> None:
         with replacing(path) as temporary:
             pq.write_table(self.table, temporary)
 
     @classmethod
-    def load(cls, method: str, names: tuple[str, ...], *paths: Path) -> Evaluations:
+    def load(cls, method: str, *paths: Path) -> Evaluations:
         """Read files that `save` wrote, one after the other."""
-        return cls(method, names, [read_table(path) for path in paths])
+        tables = [read_table(path) for path in paths]
+        axes = (name for name in tables[0].column_names if name.startswith(UNIT))
+        return cls(method, tuple(name.removeprefix(UNIT) for name in axes), tables)
 
     def followed_by(self, other: Evaluations) -> Evaluations:
         """These rows, then those of `other`."""
@@ -97,8 +101,7 @@ class Evaluations:
     def of_phase(self, phase: str) -> Evaluations:
         """The rows of one phase alone."""
         table = self.table
-        chosen = pa.array(table["phase"].to_numpy() == phase)
-        return Evaluations(self.method, self.names, [table.filter(chosen)])
+        return Evaluations(self.method, self.names, [table.filter(equal(table["phase"], phase))])
 
     def best_parameters(self, law: str) -> Parameters:
         """One sample, of the best row. Raises UserError as `best_row`."""

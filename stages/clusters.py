@@ -21,8 +21,8 @@ def main() -> None:
     explored = Evaluations.load(pair.method, made(layout.history(pair)))
     explored.names = tuple(name for name in explored.names if name not in method_params.fixed)
     explored.best_row()  # says why, where all failed
-    regions, requested = regions_of(method_params, params.optimizer, explored)
-    save_regions(layout.clusters(pair), explored.names, regions, requested)
+    regions = regions_of(method_params, params.optimizer, explored)
+    save_regions(layout.clusters(pair), explored.names, regions)
     print(f"{pair.key}: {len(regions)} regions, best loss {regions[0].loss:.5g}")
 
 

@@ -19,7 +19,7 @@ SAME = {  # methods by the paper's pull, on the same recordings: words, whose ro
     PAPER: "the paper's method",
     "package_si": "Package SI",
     "real2sim2real": "Real2Sim2Real",
-    OURS: "**this project, the paper's pull**",
+    OURS: "**`posterior`, the paper's pull**",
 }
 
 
@@ -90,11 +90,11 @@ def table(usual: dict, large: dict, by_dips: dict[str, np.ndarray]) -> list[str]
             budget = "" if method == OURS else f", {budgets[method]:,} rollouts"
             rows.append(line(f"{words}{budget}, {count} recordings", each))
     count = min(map(len, by_dips.values()))
-    return [*rows, line(f"**this project, dips**, {count} other recordings", by_dips)]
+    return [*rows, line(f"**`posterior`, dips**, {count} other recordings", by_dips)]
 
 
 def differences(usual: dict, large: dict) -> str:
-    """How ours by the paper's pull compares with the paper's method on the same recordings."""
+    """How `posterior` by the paper's pull compares with the paper's method, by recording."""
     parts = []
     for content in (usual, large):
         theirs, ours = each_of(content, PAPER), each_of(usual, OURS)
@@ -104,8 +104,8 @@ def differences(usual: dict, large: dict) -> str:
         budget, count = content["settings"]["rollouts"][PAPER], min(map(len, theirs.values()))
         parts.append(f"{listed(more)} cm ({budget:,} rollouts, {count} recordings)")
     text = (
-        "By the same pull, on the same recordings, ours misses by"
-        f" {' and by '.join(parts)} more than the paper's method, by band."
+        f"By the same pull, `posterior` misses by {' and by '.join(parts)} more than the paper's"
+        " method."
     )
     return text.replace("-", "−")
 

@@ -31,7 +31,7 @@ from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.cli.steps import Steps
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.posterior.launches import observed
-from sling2sim2real.identification.results.mounting import Mounting
+from sling2sim2real.identification.results.theta import Mounting
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.recording import files as bag
 from sling2sim2real.recording.mask_folder import MASK_NAME, masks_beside
@@ -184,7 +184,7 @@ def _target(folder: BandFolder, recording: Path) -> Path:
     """Where a recording goes: a split bag as a folder. Raises UserError where the name is taken."""
     name = bag.name_of(recording)
     parts = bag.parts_of(recording)
-    suffix = Path(bag.PACKED_NAME.sub("", parts[0].name)).suffix
+    suffix = parts[0].suffix
     target = folder.path / "recordings" / f"{name.replace('.', '_')}{suffix * (len(parts) == 1)}"
     if target.exists():
         raise UserError(f"{target}: is another recording; give {recording} another name")

@@ -171,7 +171,7 @@ class MethodDefaults(Section):
 class MethodParams(MethodDefaults):
     """What is weighed, what is searched, and how."""
 
-    bounds: dict[str, Bounds] = Field({}, validate_default=True)
+    bounds: dict[str, Bounds] = Field(default={}, validate_default=True)
 
     @field_validator("bounds")
     @classmethod

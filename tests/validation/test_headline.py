@@ -26,7 +26,7 @@ def campaigns() -> tuple[dict, dict]:
 def test_a_row_has_the_mean_the_least_and_the_most_of_recordings(campaigns) -> None:
     rows = headline.table(*campaigns, dict.fromkeys(headline.BANDS, np.array([1.0, 4.0])))
     cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in rows[2:]]
-    paper, ours = "the paper's method", "**this project"
+    paper, ours = "the paper's method", "**`posterior`"
     assert [row[0].partition(",")[0] for row in cells] == [paper, paper, "Package SI", ours, ours]
     assert "5,760 rollouts" in cells[0][0] and "600 rollouts" in cells[1][0]
     assert cells[1][1:] == ["15.0 (10.0 to 20.0)"] * 3 + ["15.0"]

@@ -285,8 +285,8 @@ def sentence(content: dict) -> list[str]:
         f" dips: predictions are off by {size:.1f} % of the distance in the mean over recordings"
         f" ({abs(worst):.1f} % at worst), and {inside:.0f} % of the launches land in their 90 %"
         f" intervals, which are {width:.0f} % of the distance wide. By the paper's pull, of the"
-        f" first recording of each, they are off by {ours:.1f} %, the paper's method by"
-        f" {theirs:.1f} %; ours is nearer on {nearer} of {len(biases[0])}."
+        f" first recording of each, they are off by {ours:.1f} %, the paper's method, by the"
+        f" neo-Hookean law, by {theirs:.1f} %; ours is nearer on {nearer} of {len(biases[0])}."
     )
     return paragraph(text)
 

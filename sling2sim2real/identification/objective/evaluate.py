@@ -14,7 +14,7 @@ import numpy as np
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.loss import TERMS, EpisodeLoss
-from sling2sim2real.simulator.interaction import Rollouts, interact
+from sling2sim2real.simulator.interaction import Rollouts, interact, with_recorded_pads
 from sling2sim2real.simulator.model import ClampedBand
 
 SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
@@ -63,13 +63,14 @@ class Evaluator:
         """Keep what every batch needs.
 
         Args:
+            band: Its pads open as the recording shows, where that says it.
             devices: Of one kind; they share each batch evenly, in their order.
             workers: Threads on the CPU (the kernels release the interpreter); None: all cores.
             simulate: Called as `simulate(band, episode=, parameters=, device=)`.
             whole: One call a batch, on the first device.
         """
         self.box, self.loss = box, loss
-        self._band = band
+        self._band = with_recorded_pads(band, episode)
         self._simulate = partial(simulate, episode=episode)
         on_gpu = devices[0].startswith("cuda")
         self._slice = sys.maxsize if whole else SLICE["cuda" if on_gpu else "cpu"]

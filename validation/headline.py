@@ -107,7 +107,7 @@ def differences(usual: dict, engine: dict) -> str:
     mean = np.mean([np.nanmean(each) for each in ours.values()])
     text = (
         f"By the same pull, on the same {count(theirs)} recordings, `posterior` misses by"
-        f" {listed(more)} cm more than the paper's method, by band; by {mean:.1f} cm in the mean."
+        f" {listed(more)} cm more than the paper's method, {mean:.1f} cm in the mean."
     )
     return text.replace("-", "−")
 

@@ -185,7 +185,7 @@ def _target(folder: BandFolder, recording: Path) -> Path:
     """Where a recording goes: a split bag as a folder. Raises UserError where the name is taken."""
     name = bag.name_of(recording)
     parts = bag.parts_of(recording)
-    suffix = Path(bag.PACKED_NAME.sub("", parts[0].name)).suffix
+    suffix = parts[0].suffix
     target = folder.path / "recordings" / f"{name.replace('.', '_')}{suffix * (len(parts) == 1)}"
     if target.exists():
         raise UserError(f"{target}: is another recording; give {recording} another name")

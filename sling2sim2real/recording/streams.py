@@ -27,7 +27,7 @@ from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.recording import images, pace
 from sling2sim2real.recording.camera import Camera
 from sling2sim2real.recording.files import Container, read_container, sha256
-from sling2sim2real.recording.messages import Elsewhere, Picture, Unreadable
+from sling2sim2real.recording.messages import Picture, Unreadable
 from sling2sim2real.recording.topics import (
     CAMERAS,
     OPTIONAL,
@@ -54,10 +54,8 @@ SHOWN = 3  # places named in one line, losses in an error
 REASON, LOSS, LINE = 100, 300, 1000  # characters: why a message is damaged, a loss, an error
 # Clocks
 FAR = 1.0  # s from a stamp to those around it: it is damage
-ALONE, FEW = 60.0, 3  # s from fewer messages than so at a topic's end to the rest: so are they
-SET_BACK = 0.01  # s by which both times of a message go back where a clock was set,
-DISORDER = 10  # but nobody sets a clock so often: the file has no order
-INTERLEAVED = 6  # times that two runs of messages alternate which cover the same time
+WINDOW = 9  # messages around one
+SET_BACK = 0.01  # s by which both times of a message go back where a clock was set
 TOLERANCE = 0.5  # s between the clocks of two topics: transport and drivers take less
 SECONDS = 5  # of least delays: fewer tell nothing of a clock's course
 
@@ -80,21 +78,6 @@ class Clock:
     step: float | None = None
 
 
-class Pictures(Sequence[Picture]):
-    """Pictures of a topic, each of which is read when it is asked for."""
-
-    def __init__(self, choice: Choice, places: np.ndarray) -> None:
-        self._choice, self._places = choice, places
-
-    def __len__(self) -> int:
-        return len(self._places)
-
-    def __getitem__(self, number: Any) -> Any:
-        if isinstance(number, slice | np.ndarray):
-            return Pictures(self._choice, self._places[number])
-        return self._choice.read(self._choice.channel.payloads[self._places[number]]).value
-
-
 @dataclass(frozen=True)
 class Stream(Generic[Values]):
     """One topic, sorted by stamp.
@@ -103,7 +86,7 @@ class Stream(Generic[Values]):
         topic: Its name.
         frame: frame_id of its messages.
         stamp: header.stamp, ns, shape (S,), strictly increasing.
-        values: One column a quantity, shape (S, C), or `Pictures`, length S.
+        values: One column a quantity, shape (S, C), or an array of `Picture`s, shape (S,).
         receipt_delay: Median of log_time - stamp [s].
         lost: Messages that are not in it, for whatever reason.
         notes: What was lost or mended, in words.
@@ -161,7 +144,7 @@ class Recording:
         pose: Position [m] and quaternion xyzw in `pose.frame`, values (S, 7).
         gripper: Sum of the finger positions, as they are reported [m], values (S, 1); None where
             not recorded.
-        color, depth: `Pictures`, decoded by `images`.
+        color, depth: Their `Picture`s, decoded by `images`.
         color_camera, depth_camera: Their intrinsics.
         transforms: The static tree.
         losses: What was lost of the file or mended in it, in words.
@@ -331,7 +314,7 @@ class RawTopic:
     """One topic as it was read, in the order of the file.
 
     Attributes:
-        values: Shape (S, C); of pictures their places in the file.
+        values: Shape (S, C), or of pictures (S,).
         reason: Why the first damaged message cannot be read.
     """
 
@@ -349,7 +332,7 @@ class RawTopic:
 
     @property
     def topic(self) -> str:
-        return self.choice.channel.topic
+        return self.choice.topic.name
 
     def keep(self, which: np.ndarray) -> None:
         """Only these messages: a mask or an order."""
@@ -366,18 +349,20 @@ class RawTopic:
         return f"{words}; the first damaged one: {self.reason}" if self.reason else words
 
     def arrive(self) -> None:
-        """Put messages in the order in which they came, without stamps that are damage, evenly.
+        """Drop stamps that are damage, and put bursts evenly, in the order in which messages came.
 
-        Raises UserError where the machine's clock was set back.
+        Raises UserError where both times go back.
         """
-        back = _back(self.stamp, self.log)
-        if len(back) < DISORDER:
-            for i in back:
-                self._expect_not_set_back(int(i))
-        if len(back):  # chunks are in disorder
-            self.keep(np.argsort(self.log, kind="stable"))
+        ways = np.maximum(np.diff(self.stamp), np.diff(self.log))
+        if ways.min(initial=0) < -SET_BACK * 1e9:
+            i = int(np.argmin(ways))
+            raise UserError(
+                f"{self.topic}: its messages go back by {-ways[i] * 1e-9:.3f} s after"
+                f" {(self.stamp[i] - self.stamp[0]) * 1e-9:.2f} s: record again without setting the"
+                " machine's clock; if the file is only out of order, `mcap sort` it"
+            )
+        self.drop(_outliers(self.stamp), "far off in time")
         self.disorder = int(np.count_nonzero(np.diff(self.stamp) < 0))
-        self.drop(_outliers(self.stamp, self.log), "far off in time")
         if self.role in CAMERAS:
             return
         even = pace.without_bursts(self.stamp, self.log, self.values)
@@ -391,54 +376,26 @@ class RawTopic:
                 f" time {side} each"
             )
 
-    def _expect_not_set_back(self, i: int) -> None:
-        """Chunks in another order go back too, but do not cover the same time twice."""
-        stamp = self.stamp
-        before, after = stamp[:i][stamp[:i] >= stamp[i]], stamp[i:][stamp[i:] <= stamp[i - 1]]
-        run = np.repeat([0, 1], [len(before), len(after)])
-        order = np.argsort(np.concatenate([before, after]), kind="stable")
-        if np.count_nonzero(np.diff(run[order])) >= INTERLEAVED:
-            size, at = (stamp[i - 1] - stamp[i]) * 1e-9, (stamp[i - 1] - stamp[0]) * 1e-9
-            raise UserError(
-                f"the clock of the machine was set back by {size:.3f} s after {at:.2f} s of"
-                f" {self.topic}: record again without setting clocks"
-            )
-
 
 def _read(role: str, choice: Choice) -> RawTopic:
     """Read a topic's messages. Raises UserError where fewer than two are left."""
-    stamps, logs, values, frames, lost = [], [], [], [], Counter()
-    seen, bare, reason = set(), 0, ""
-    channel = choice.channel
-    for place, (log_time, payload) in enumerate(
-        zip(channel.log_times, channel.payloads, strict=True)
-    ):
-        try:
-            stamp, frame, value = choice.read(payload)
-        except Elsewhere:
-            continue
-        except Unreadable as error:
+    stamps, logs, values, frames, lost, reason = [], [], [], [], Counter(), ""
+    for log_time, reading in choice.messages:
+        if isinstance(reading, Unreadable):
             lost["damaged"] += 1
-            reason = reason or shortened(printable(str(error)), REASON)
-            continue
-        if (log_time, hash(payload)) in seen:
-            lost["doubled"] += 1
-            continue
-        seen.add((log_time, hash(payload)))
-        if isinstance(value, Picture):
-            value = place
-        elif not all(abs(x) < ABSURD for x in value):
+            reason = reason or shortened(printable(reading), REASON)
+        elif role not in CAMERAS and not all(abs(x) < ABSURD for x in reading.value):
             lost["not finite"] += 1
-            continue
-        bare += not stamp
-        stamps.append(stamp or 0)
-        logs.append(log_time)
-        values.append(value)
-        frames.append(frame)
+        else:
+            stamps.append(reading.stamp or 0)
+            logs.append(log_time)
+            values.append(reading.value)
+            frames.append(reading.frame)
     frame = Counter(frames).most_common(1)[0][0] if frames else ""
     stamp, log = np.array(stamps, np.int64), np.array(logs, np.uint64).astype(np.int64)
-    raw = RawTopic(role, choice, frame, stamp, log, np.array(values), lost, reason)
-    if bare == len(stamps) > 0:
+    array = np.array(values, dtype=object if role in CAMERAS else float)
+    raw = RawTopic(role, choice, frame, stamp, log, array, lost, reason)
+    if len(stamp) and not stamp.any():
         if role not in TIMED:
             raise UserError(f"topic {raw.topic} has no header stamps, record with time stamps")
         raw.stamp = log.copy()
@@ -461,26 +418,25 @@ def _sorted(raw: RawTopic) -> Stream[Any]:
     raw.keep(np.argsort(raw.stamp, kind="stable"))
     raw.drop(np.diff(raw.stamp, prepend=raw.stamp[0] - 1) == 0, "with the stamp of another")
     _expect_some(raw)
-    values: Any = Pictures(raw.choice, raw.values)
     hold = None
     if raw.role not in CAMERAS:
         if raw.role in LONE and raw.choice.convert is None:
             raw.drop(_lone(raw), "far off those around")
-        values = raw.values.astype(float)
         if raw.choice.convert is not None:
-            values = raw.choice.convert(values)
-        hold = pace.hold_of(raw.stamp, values) if raw.role in LONE else None
+            raw.values = raw.choice.convert(raw.values)
+        hold = pace.hold_of(raw.stamp, raw.values) if raw.role in LONE else None
     if hold:
-        retained = pace.first_of_each(raw.stamp, values, hold)
-        times = f"{len(values) / np.count_nonzero(retained):.0f}"
+        retained = pace.first_of_each(raw.stamp, raw.values, hold)
+        times = f"{len(retained) / np.count_nonzero(retained):.0f}"
         raw.notes.append(f"each value is sent {times} times: the repeats are left out")
         raw.keep(retained)
-        values = values[retained]
     if raw.lost:
         raw.notes.append(f"lost {raw.words()}")
     delay = float(np.median(raw.log - raw.stamp) * 1e-9)
     lost, hold = sum(raw.lost.values()), (hold or 0.0) * 1e-9
-    return Stream(raw.topic, raw.frame, raw.stamp, values, delay, lost, raw.notes, raw.bursts, hold)
+    return Stream(
+        raw.topic, raw.frame, raw.stamp, raw.values, delay, lost, raw.notes, raw.bursts, hold
+    )
 
 
 def _lone(raw: RawTopic) -> np.ndarray:
@@ -514,39 +470,18 @@ def _gaps(stream: Stream[Any], origin: int, first: int, last: int) -> list[str]:
     return notes
 
 
-def _outliers(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
+def _outliers(stamp: np.ndarray) -> np.ndarray:
     """Which stamps [ns], in the order of arrival, are far from all around them; shape (S,).
 
-    By a running median of five, as Hampel's filter, with a fixed limit. At the ends of a topic
-    these are also one or two that log_time has elsewhere, or that come a minute before or after all
-    others: too few to tell of a clock.
+    By a running median, as Hampel's filter, with a fixed limit; also the first two and last two.
     """
-    if len(stamp) < 5:
+    if len(stamp) < WINDOW:
         return np.zeros(len(stamp), bool)
     middle = np.median(stamp.astype(float))
-    usual = median_filter(stamp - middle, 5, mode="nearest") + middle
+    usual = median_filter(stamp - middle, WINDOW, mode="mirror") + middle
     ways = np.diff(stamp)
     limit = max(FAR * 1e9, 10 * float(np.median(ways[ways > 0])) if (ways > 0).any() else 0.0)
-    far_off = np.abs(stamp - usual) > limit
-    for order in (1, -1):
-        retained = np.flatnonzero(~far_off)[::order]
-        ways, by_log = np.abs(np.diff(stamp[retained])), np.abs(np.diff(log[retained]))
-        elsewhere = np.abs(ways - by_log) > limit / 2
-        far = ways > np.where(elsewhere, limit, max(ALONE * 1e9, limit))
-        begin = 0
-        for i in np.flatnonzero(far[: 2 * FEW]):
-            if i + 1 - begin >= FEW or 2 * i > len(retained):
-                break
-            begin = i + 1
-        far_off[retained[:begin]] = True
-    return far_off
-
-
-def _back(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
-    """Messages at which both times go back, by about as much."""
-    way, way_by_log = np.diff(stamp), np.diff(log)
-    both = np.maximum(way, way_by_log) < -SET_BACK * 1e9
-    return np.flatnonzero(both & (np.abs(way - way_by_log) < -way_by_log / 2)) + 1
+    return np.abs(stamp - usual) > limit
 
 
 def _least(raw: RawTopic, start: int) -> dict[int, int]:

@@ -1,4 +1,4 @@
-"""A bag's folder, split or not, is the recording that its parts make."""
+"""A bag's folder, split or not, is the recording that its parts make; bags of other kinds."""
 
 from __future__ import annotations
 
@@ -12,14 +12,7 @@ from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.files import (
-    missing_parts,
-    name_of,
-    once,
-    parts_of,
-    read_container,
-    sha256,
-)
+from sling2sim2real.recording.files import name_of, once, parts_of, read_container, sha256
 from sling2sim2real.recording.streams import read_recording
 from tests.recording.parts import metadata, split
 from tests.recording.test_foxglove import assert_same_recording
@@ -54,13 +47,9 @@ TF = "geometry_msgs/TransformStamped[] transforms"
 NOETIC.register(get_types_from_msg(TF, "tf2_msgs/msg/TFMessage"))
 
 
-@pytest.mark.parametrize("plugin", StoragePlugin)
-@pytest.mark.parametrize("own_types", [True, False])
-def test_the_bag_that_a_library_of_others_writes(
-    own_types, plugin, whole, tmp_path, params
-) -> None:
-    """rosbags names its file and writes the metadata; its one part is the recording."""
-    folder, connections = tmp_path / "other", {}
+def written(folder: Path, whole: Path, plugin: StoragePlugin, own_types: bool) -> Path:
+    """The file of a bag that rosbags writes of a recording; it names it, and writes metadata."""
+    connections = {}
     with BagWriter(folder, version=9, storage_plugin=plugin) as bag:
         for schema, channel, message in messages_of(whole):
             if channel.topic not in connections:
@@ -69,39 +58,38 @@ def test_the_bag_that_a_library_of_others_writes(
                 connections[channel.topic] = bag.add_connection(channel.topic, schema.name, **types)
             bag.write(connections[channel.topic], message.log_time, message.data)
     suffix = {StoragePlugin.MCAP: "mcap", StoragePlugin.SQLITE3: "db3"}[plugin]
-    assert [part.name for part in parts_of(folder)] == [f"other.{suffix}"]
+    return folder / f"{folder.name}.{suffix}"
+
+
+@pytest.mark.parametrize("plugin", StoragePlugin)
+@pytest.mark.parametrize("own_types", [True, False])
+def test_the_bag_of_another_library(own_types, plugin, whole, tmp_path, params) -> None:
+    folder = tmp_path / "other"
+    file = written(folder, whole, plugin, own_types)
+    assert parts_of(folder) == parts_of(file) == [file]
     assert_same_recording(read_recording(folder, params.setup), read_recording(whole, params.setup))
-    assert sha256(folder) == sha256(folder / f"other.{suffix}") and name_of(folder) == "other"
+    assert sha256(folder) == sha256(file) and name_of(folder) == "other"
 
 
 def test_a_file_of_sqlite_without_metadata_or_definitions(whole, tmp_path, params) -> None:
-    """As Humble writes it; and one whose end is damaged."""
-    folder = tmp_path / "other"
-    connections = {}
-    with BagWriter(folder, version=8, storage_plugin=StoragePlugin.SQLITE3) as bag:
-        for schema, channel, message in messages_of(whole):
-            if channel.topic not in connections:
-                add = bag.add_connection
-                connections[channel.topic] = add(channel.topic, schema.name, typestore=HUMBLE)
-            bag.write(connections[channel.topic], message.log_time, message.data)
+    """As Humble writes it; and one that is damaged or cut."""
     file = tmp_path / "alone.db3"
-    (folder / "other.db3").rename(file)
+    written(tmp_path / "other", whole, StoragePlugin.SQLITE3, True).rename(file)
     base = sqlite3.connect(file)
-    base.execute("DROP TABLE message_definitions")
-    base.commit()
+    base.executescript("DROP TABLE message_definitions; UPDATE schema SET schema_version = 3")
     base.close()
     assert_same_recording(read_recording(file, params.setup), read_recording(whole, params.setup))
     assert name_of(file) == "alone"
-    whole_file = file.read_bytes()
-    page = 4096 * (len(whole_file) // 8192)
-    file.write_bytes(whole_file[:page] + bytes(4096) + whole_file[page + 4096 :])
-    assert "the rest of the file cannot be read" in read_container(file).losses[0]
-    file.write_bytes(whole_file[: len(whole_file) // 2])
-    with pytest.raises(UserError, match="alone.db3: is no ROS 2 bag, or a damaged one"):
-        read_container(file)
-    file.write_bytes(b"SQLite format 3\0" + bytes(100))
-    with pytest.raises(UserError, match="alone.db3: is no ROS 2 bag, or a damaged one"):
-        read_container(file)
+    content = file.read_bytes()
+    page = 4096 * (len(content) // 8192)
+    for damaged in (
+        content[:page] + bytes(4096) + content[page + 4096 :],
+        content[: len(content) // 2],
+        b"SQLite format 3\0" + bytes(100),
+    ):
+        file.write_bytes(damaged)
+        with pytest.raises(UserError, match="alone.db3: is no ROS 2 bag, or a damaged one"):
+            read_container(file)
 
 
 def test_a_bag_of_ros_1(whole, tmp_path, params) -> None:
@@ -117,7 +105,7 @@ def test_a_bag_of_ros_1(whole, tmp_path, params) -> None:
             bag.write(connections[channel.topic], message.log_time, data)
     assert_same_recording(read_recording(file, params.setup), read_recording(whole, params.setup))
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
-    with pytest.raises(UserError, match="my.bag: a damaged ROS 1 bag .*: `rosbag reindex` it"):
+    with pytest.raises(UserError, match="my.bag: is a damaged ROS 1 bag .*: `rosbag reindex`"):
         read_container(file)
 
 
@@ -152,22 +140,16 @@ def test_recordings_that_are_called_alike_stay_apart(tmp_path) -> None:
         parts_of(tmp_path)
 
 
-def test_a_part_that_is_not_there_is_a_loss(parts) -> None:
+def test_a_part_that_is_missing_or_has_no_end_is_a_loss(parts) -> None:
+    """The recorder was killed: nothing wrote metadata."""
     folder = parts[0].parent
+    parts[2].write_bytes(parts[2].read_bytes()[: parts[2].stat().st_size * 2 // 3])
+    cut = read_container(folder).losses[0]
+    assert cut.startswith("my_2.mcap: the file has no end: cut off after")
     parts[1].unlink()
     metadata(folder, *(part.name for part in parts))
     assert read_container(folder).losses[0] == "my_1.mcap, which metadata.yaml lists, is missing"
     assert parts_of(folder) == [parts[0], parts[2]]
-    parts[2].unlink()
-    assert len(missing_parts(parts[0])) == 2 and len(missing_parts(folder)) == 2
-
-
-def test_a_part_without_its_end_is_named(parts) -> None:
-    """The recorder was killed: the last part has no end, and nothing wrote metadata."""
-    data = parts[2].read_bytes()
-    parts[2].write_bytes(data[: len(data) * 2 // 3])
-    container = read_container(parts[0].parent)
-    assert container.losses[0].startswith("my_2.mcap: the file has no end: cut off after")
 
 
 @pytest.mark.parametrize(

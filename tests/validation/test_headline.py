@@ -36,7 +36,7 @@ def test_a_row_has_the_mean_the_least_and_the_most_of_recordings(campaigns) -> N
 
 def test_methods_are_compared_on_the_recordings_that_both_have(campaigns) -> None:
     text = headline.differences(*campaigns)
-    assert "on the same 1 recordings" in text and "by 6.0 cm in the mean" in text
+    assert "on the same 1 recordings" in text and "6.0 cm in the mean" in text
     assert "misses by −2.0, −2.0 and −2.0 cm more" in text
 
 

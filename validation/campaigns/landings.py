@@ -16,6 +16,7 @@ in --work: what comes after them is repeated without the recording, once results
 
 from __future__ import annotations
 
+import re
 import shutil
 import time
 from collections.abc import Sequence
@@ -224,10 +225,12 @@ ROWS = {  # of the table
     "paper, virgin": "the paper's pull",
     f"paper, virgin, {FIRST}": "the paper's pull, first of each",
     "paper, virgin, the paper's method": "… by the paper's method",
-    "informative, worn": "dips, drawn before",
-    "paper, worn": "the paper's pull, drawn before",
 }
-WORDS = {"bands": "the rig's three bands", "develop": "four to develop on", "sealed": "16 held-out"}
+WORDS = {
+    "bands": "the rig's three bands",
+    "develop": "four develop rubbers",
+    "sealed": "16 held-out rubbers",
+}
 
 
 def table(contents: dict[str, dict]) -> list[str]:
@@ -257,7 +260,7 @@ def table(contents: dict[str, dict]) -> list[str]:
                 cells.append(f"{mean} ({low:.0f} to {high:.0f} %; {band}; {recording})")
                 width = 100 * means["median_width"]
                 cells += [f"{width:.1f} %", f"{settled} of {count}"]
-            rows.append(row(*cells).replace("-", "−"))
+            rows.append(re.sub(r"-(?=\d)", "−", row(*cells)))
     for name, words in WORDS.items():
         there, whole = contents[name]["jobs"]
         if there < whole:
@@ -281,12 +284,11 @@ def sentence(content: dict) -> list[str]:
     ]
     nearer = sum(biases[0][name] < biases[1].get(name, np.nan) for name in biases[0])
     text = (
-        f"On {len(bands)} further virtual rubbers, which took part in no choice, by the pull with"
-        f" dips: predictions are off by {size:.1f} % of the distance in the mean over recordings"
-        f" ({abs(worst):.1f} % at worst), and {inside:.0f} % of the launches land in their 90 %"
-        f" intervals, which are {width:.0f} % of the distance wide. By the paper's pull, of the"
-        f" first recording of each, they are off by {ours:.1f} %, the paper's method, by the"
-        f" neo-Hookean law, by {theirs:.1f} %; ours is nearer on {nearer} of {len(biases[0])}."
+        f"On {len(bands)} held-out virtual rubbers, with dips, predictions are off by {size:.1f} % of"
+        f" the distance (mean over recordings; {abs(worst):.1f} % at worst), and {inside:.0f} % of the"
+        f" launches land in 90 % intervals, which are {width:.0f} % wide. By the paper's pull they are"
+        f" off by {ours:.1f} %, the paper's method with the neo-Hookean law by {theirs:.1f} %;"
+        f" `posterior` is nearer on {nearer} of {len(biases[0])}."
     )
     return paragraph(text)
 

@@ -284,11 +284,11 @@ def sentence(content: dict) -> list[str]:
     ]
     nearer = sum(biases[0][name] < biases[1].get(name, np.nan) for name in biases[0])
     text = (
-        f"On {len(bands)} held-out virtual rubbers, with dips, predictions are off by {size:.1f} % of"
-        f" the distance (mean over recordings; {abs(worst):.1f} % at worst), and {inside:.0f} % of the"
-        f" launches land in 90 % intervals, which are {width:.0f} % wide. By the paper's pull they are"
-        f" off by {ours:.1f} %, the paper's method with the neo-Hookean law by {theirs:.1f} %;"
-        f" `posterior` is nearer on {nearer} of {len(biases[0])}."
+        f"On {len(bands)} held-out virtual rubbers, with dips, predictions are off by {size:.1f} %"
+        f" of the distance (mean over recordings; {abs(worst):.1f} % at worst), and {inside:.0f} %"
+        f" of the launches land in 90 % intervals, which are {width:.0f} % wide. By the paper's"
+        f" pull they are off by {ours:.1f} %, the paper's method with the neo-Hookean law by"
+        f" {theirs:.1f} %; `posterior` is nearer on {nearer} of {len(biases[0])}."
     )
     return paragraph(text)
 

@@ -24,8 +24,8 @@ from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.inputs import CardInputs, aims_of
 from sling2sim2real.card.write import write as write_card
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.results.mounting import Mounting
 from sling2sim2real.identification.results.theta import (
+    Mounting,
     ThetaFile,
     load_samples,
     load_theta,

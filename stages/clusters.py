@@ -24,8 +24,8 @@ def main() -> None:
     )
     explored = Evaluations.load(pair.method, names, made(layout.history(pair)))
     explored.best_row()  # says why, where all failed
-    regions, requested = regions_of(method_params, params.optimizer, explored)
-    save_regions(layout.clusters(pair), names, regions, requested)
+    regions = regions_of(method_params, params.optimizer, explored)
+    save_regions(layout.clusters(pair), names, regions)
     print(f"{pair.key}: {len(regions)} regions, best loss {regions[0].loss:.5g}")
 
 

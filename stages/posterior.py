@@ -17,12 +17,15 @@ from sling2sim2real.base.launches_file import FIT, read_launches
 from sling2sim2real.base.layout import made
 from sling2sim2real.base.machine import workers
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.density import entries_of, evaluated_mode
+from sling2sim2real.identification.posterior.confidence import (
+    confidence,
+    evaluated_mode,
+    theta_entries,
+)
 from sling2sim2real.identification.posterior.identify import fit_posterior
 from sling2sim2real.identification.posterior.launches import Evidence, Observed
-from sling2sim2real.identification.results.confidence_file import save_confidence
 from sling2sim2real.identification.results.evaluations import Evaluations
-from sling2sim2real.identification.results.mounting import sling_of_method
+from sling2sim2real.identification.results.theta import save_confidence, sling_of_method
 from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.simulator.model import LaunchSetup
 from stages.start import pair_of_stage, run
@@ -49,7 +52,10 @@ def main() -> None:
     )
     mode = evaluated_mode(params, method, sling, episodes[0], density)
     explored.followed_by(mode).save(layout.evaluations(pair))
-    entries = entries_of(density, explored)
+    entries = theta_entries(density) | {
+        "confidence": confidence(density),
+        "rollouts": len(explored.total) + density.rollouts,
+    }
     save_confidence(layout.confidence(pair), pair.band, entries, density.parameters)
 
 

@@ -14,8 +14,8 @@ from pipeline.layout import Layout
 from sling2sim2real.base.files import write_json
 from sling2sim2real.base.layout import made
 from sling2sim2real.base.parameters import TABLE
-from sling2sim2real.identification.results.confidence_file import load_confidence
 from sling2sim2real.identification.results.evaluations import TERMS, Evaluations, theta_content
+from sling2sim2real.identification.results.theta import load_confidence
 from sling2sim2real.settings.identification import parameter_names
 from stages.start import pair_of_stage, run
 

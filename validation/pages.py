@@ -37,7 +37,7 @@ def checks() -> list[str]:
 
 BLOCKS: dict[str, tuple[str, Callable[[], list[str]]]] = {  # by page: name of its marks, its lines
     "README.md": ("landings", headline.block),
-    "docs/checks.md": ("checks", checks),
+    "docs/reference/checks.md": ("checks", checks),
     "docs/identification.md": (
         "landings",
         lambda: landings.table({s: read(ROOT / landings.report_of(s)) for s in landings.SETS}),

@@ -32,7 +32,7 @@ from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.cli.steps import Steps
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.posterior.launches import Observed
-from sling2sim2real.identification.results.mounting import Mounting
+from sling2sim2real.identification.results.theta import Mounting
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.recording import files as bag
 from sling2sim2real.recording.mask_folder import MASK_NAME, masks_beside

@@ -124,7 +124,7 @@ def template(tmp_path_factory) -> Path:
     evaluations.to_parquet(data / "evaluations" / f"{PAIR}.parquet")
     write_launches(data / "launches" / f"{BAND}.csv", [])
     region = Region(np.full(5, 0.4), 0.01 * np.eye(5), 2.0, [2, 0])
-    save_regions(data / "clusters" / f"{PAIR}.json", NAMES, [region], 5)
+    save_regions(data / "clusters" / f"{PAIR}.json", NAMES, [region])
     loss = {"geom": 0.5, "force": 0.25, "work": 0.5, "total": 1.25}
     theta = {"band": BAND, "method": METHOD, "theta": THETA, "loss": loss, "rollouts": 5}
     theta["confidence"] = confidence()

@@ -237,29 +237,25 @@ def table(contents: dict[str, dict]) -> list[str]:
     """The table of docs/identification.md, of the reports of all sets."""
     rows = [
         "| rubbers | recorded by | recordings | size of a recording's bias, mean (worst) | launches"
-        " inside: mean of the bands (by bands drawn anew; least band; least recording) | median"
-        " width | fits that settled |",
-        "|---|---|---:|---:|---:|---:|---:|",
+        " inside, mean of the bands (least band; least recording) | median width |",
+        "|---|---|---:|---:|---:|---:|",
     ]
     percent = "{:.0f} %".format
     for name, words in WORDS.items():
         for kind, how in ROWS.items():
             if kind not in (of := contents[name]["figures"]):
                 continue
-            means, (settled, count) = of[kind]["together"], of[kind]["settled"]
+            means, count = of[kind]["together"], of[kind]["settled"][1]
             size, worst = 100 * means["mean_size_of_bias"], 100 * means["worst_bias"]
             cells = [words, how, str(count), f"{size:.1f} % ({worst:+.1f} %)"]
             if means["coverage"] is None:
-                cells += ["–", "–", "–"]
+                cells += ["–", "–"]
             else:
                 mean, band, recording = (
                     percent(100 * means[name])
                     for name in ("coverage", "least_coverage", "least_coverage_of_a_recording")
                 )
-                low, high = (100 * value for value in means["coverage_by_bands"])
-                cells.append(f"{mean} ({low:.0f} to {high:.0f} %; {band}; {recording})")
-                width = 100 * means["median_width"]
-                cells += [f"{width:.1f} %", f"{settled} of {count}"]
+                cells += [f"{mean} ({band}; {recording})", f"{100 * means['median_width']:.1f} %"]
             rows.append(re.sub(r"-(?=\d)", "−", row(*cells)))
     for name, words in WORDS.items():
         there, whole = contents[name]["jobs"]

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
@@ -35,6 +34,14 @@ class Evaluations:
     names: tuple[str, ...]
     _parts: list[pa.Table] = field(default_factory=list)
 
+    @property
+    def _schema(self) -> pa.Schema:
+        text, number, counter = pa.string(), pa.float64(), pa.int32()
+        fields = {"method": text, "phase": text, "generation": counter, "solver": counter}
+        axes = [f"unit_{name}" for name in self.names] + [*self.names]
+        fields |= dict.fromkeys((*axes, *TERMS, "total"), number)
+        return pa.schema([*fields.items(), ("failure", text)])
+
     def add(
         self,
         evaluation: Evaluation,
@@ -46,30 +53,22 @@ class Evaluations:
         """Append a batch; `solver` says who asked for each point, shape (N,)."""
         count = len(evaluation.total)
         columns = {
-            "method": pa.array([self.method] * count, pa.string()),
-            "phase": pa.array([phase] * count, pa.string()),
-            "generation": pa.array([generation] * count, pa.int32()),
-            "solver": pa.array([None] * count if solver is None else solver, pa.int32()),
+            "method": [self.method] * count,
+            "phase": [phase] * count,
+            "generation": [generation] * count,
+            "solver": [None] * count if solver is None else solver,
+            **{f"unit_{name}": evaluation.unit[:, k] for k, name in enumerate(self.names)},
+            **{name: evaluation.theta[:, k] for k, name in enumerate(self.names)},
+            **evaluation.terms,
+            "total": evaluation.total,
+            "failure": evaluation.failure,
         }
-        for prefix, values in (("unit_", evaluation.unit), ("", evaluation.theta)):
-            for name, column in zip(self.names, values.T, strict=True):
-                columns[prefix + name] = pa.array(column, pa.float64())
-        for name in TERMS:
-            columns[name] = pa.array(evaluation.terms[name], pa.float64())
-        columns["total"] = pa.array(evaluation.total, pa.float64())
-        columns["failure"] = pa.array(evaluation.failure, pa.string())
-        self._parts.append(pa.table(columns))
+        self._parts.append(pa.table(columns, schema=self._schema))
 
     @property
     def table(self) -> pa.Table:
-        if not self._parts:  # the columns of no rows
-            points, values = np.zeros((0, len(self.names))), np.zeros(0)
-            terms = dict.fromkeys(TERMS, values)
-            nothing: Any = SimpleNamespace(
-                unit=points, theta=points, terms=terms, total=values, failure=[]
-            )
-            self.add(nothing, phase="", generation=0)
-        return pa.concat_tables(self._parts).combine_chunks()
+        parts = self._parts or [self._schema.empty_table()]
+        return pa.concat_tables(parts).combine_chunks()
 
     @property
     def unit(self) -> np.ndarray:
@@ -122,7 +121,7 @@ def theta_content(evaluations: Evaluations, band: str, entries: dict) -> dict:
 
     Args:
         evaluations: Everything that a search evaluated; a density's mode is a phase of its own.
-        entries: What else the search says of θ (identify/results/confidence_file.py).
+        entries: What else the search says of θ (`PosteriorFile`).
     """
     mode = evaluations.of_phase(POSTERIOR)
     chosen = mode if len(mode.total) else evaluations

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from sling2sim2real.identification.posterior import fit as module
+from sling2sim2real.identification.posterior.confidence import leave_one_out
 from sling2sim2real.identification.posterior.expansion import Expansion
 from sling2sim2real.identification.posterior.fit import PASSES, NoFit, fit, widened
-from sling2sim2real.identification.posterior.identify import birge_ratio, leave_one_out
+from sling2sim2real.identification.posterior.identify import birge_ratio
 from sling2sim2real.identification.posterior.launches import LaunchExpansion
 from sling2sim2real.identification.posterior.sampling import samples_around
 from tests.identification.posterior.toy import SIZE, TIME, Curve, curve, least, slopes, space

@@ -5,7 +5,7 @@ import pytest
 
 from sling2sim2real.identification.posterior.coordinates import Coordinates
 from sling2sim2real.identification.posterior.launches import LaunchLikelihood, Observed
-from sling2sim2real.identification.results.mounting import load_sling
+from sling2sim2real.identification.results.theta import load_sling
 from sling2sim2real.simulator.launch import launch
 from sling2sim2real.simulator.model import LaunchHistory, LaunchSetup
 from sling2sim2real.simulator.parameters import Parameters

@@ -1,13 +1,5 @@
-// How a camera frame of a rollout is laid out: points over the 16 lanes of a CPU vector, or over the 32 threads of a
-// CUDA warp, a point each; one text for both.
-//
-// Points come in compact blocks, each within a ball. The balls, LANES of them at once, tell what cannot be nearest; it
-// is skipped, and nothing is changed by it.
-//
-// Wants the macros EDGES, CULLED (0: nothing is skipped), CPU_LANES (as chamfer.py packs). In: line (N, K, EDGES + 1, 3),
-// packed points: blocks of 4 rows x, y, z, weight (0: padding, a copy of a real point), their balls: groups of LANES as
-// 4 rows x, y, z, radius, frame_blocks, frame_groups (K + 1). Out: errors (N, K, 2) [m], measured to simulated and
-// back; the first is NaN for an empty frame.
+// One text for both devices: the lanes of a CPU's vector, or the 32 threads of a CUDA warp, hold a point or an edge each.
+// The macros and names below are all that differs.
 
 #if defined(__CUDA_ARCH__)
 #define THREADS 32
@@ -66,7 +58,45 @@ const real zero = real() * 0.0f;
 #define LESS 0.99999f  // bounds are this much wider than rounding could ask for
 #define MORE 1.00001f
 
+
+// A thread (or warp) has one camera frame of one rollout. Its measured points are blocks of LANES, each within a ball; balls
+// come in groups of LANES. The simulated surface has PARTS, each with VERTICES:
 const int item = tid / THREADS, frame = item % frames;
 const int first = frame_blocks.data[frame], last = frame_blocks.data[frame + 1];
 const int first_group = frame_groups.data[frame], last_group = frame_groups.data[frame + 1];
 const float* nodes = line.data + (size_t)item * (EDGES + 1) * 3;
+const float* rest = rest_edges.data;
+float rest_length = 0.0f;
+for (int e = 0; e < EDGES; ++e) rest_length += rest[e];
+float broken = 0.0f;
+for (int n = 0; n < 3 * (EDGES + 1); ++n) broken += 0.0f * nodes[n];  // NaN where a node is not finite
+
+enum {
+  START = 0,          // of a part's axis, and
+  AXIS = 3,           // its vector; none of a ring
+  ALONG = 6,          // the same over its squared length
+  RADIUS = 9,         // of the surface around the axis, within
+  OFF,                // as much as that
+  MIDDLE,             // of the vertices, which lie within
+  REACH = MIDDLE + 3,
+  WEIGHT,             // of each vertex
+  VERTEX,             // 3 rows each
+  NEAREST = VERTEX + 3 * VERTICES,  // distance of a measured point from each, squared
+  ROWS = NEAREST + VERTICES,
+  WIDE = (PARTS + LANES - 1) / LANES * LANES,
+};
+SHARED float surface[ROWS][WIDE];
+SYNC();  // a block may have had another frame before
+
+auto to_axis = [&](int part, real x, real y, real z) -> real {
+  const real dx = x - surface[START][part], dy = y - surface[START + 1][part], dz = z - surface[START + 2][part];
+  real at = dx * surface[ALONG][part] + dy * surface[ALONG + 1][part] + dz * surface[ALONG + 2][part];
+  at = at < 0.0f ? zero : at;
+  at = at > 1.0f ? zero + 1.0f : at;
+  const real ex = dx - at * surface[AXIS][part], ey = dy - at * surface[AXIS + 1][part], ez = dz - at * surface[AXIS + 2][part];
+  return ROOT(ex * ex + ey * ey + ez * ez);
+};
+auto square_to = [&](const float* point, real x, real y, real z) -> real {
+  const real dx = x - point[0], dy = y - point[WIDE], dz = z - point[2 * WIDE];
+  return dx * dx + dy * dy + dz * dz;
+};

@@ -213,6 +213,8 @@ def report(args: argparse.Namespace, params: Params, count: int, results: list[d
     command = f"--workers {args.workers} --recordings {args.recordings} --seeds {args.seeds}"
     if args.preset:
         command += f" --preset {args.preset} --report {args.report}"
+    if args.methods != list(params.methods):
+        command += f" --methods {' '.join(args.methods)}"
     content = {
         "kind": "virtual",
         "asked": "What each part of the paper's method, and each baseline, changes in the distance"

@@ -25,7 +25,6 @@ SETTING = re.compile(r"\w+=\S*")  # of the environment, before a command
 IGNORED = {
     "reports/index.html",
     "reports/appendix.html",
-    "reports/run.js",
     "reports/bands",
     "reports/summary.json",
 }  # a run writes them

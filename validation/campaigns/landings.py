@@ -219,25 +219,25 @@ def together(of_bands: dict[str, dict]) -> dict:
 
 ROWS = {  # of the table
     "informative, virgin": "dips",
-    "informative, virgin, one launch": "dips, one launch measured",
-    f"informative, virgin, {FIRST}": "dips, first of each",
-    "informative, virgin, the paper's method": "… by the paper's method",
-    "paper, virgin": "the paper's pull",
-    f"paper, virgin, {FIRST}": "the paper's pull, first of each",
-    "paper, virgin, the paper's method": "… by the paper's method",
+    "informative, virgin, one launch": "dips, one launch",
+    f"informative, virgin, {FIRST}": "dips, first",
+    "informative, virgin, the paper's method": "… by `paper`",
+    "paper, virgin": "paper's pull",
+    f"paper, virgin, {FIRST}": "paper's pull, first",
+    "paper, virgin, the paper's method": "… by `paper`",
 }
 WORDS = {
-    "bands": "the rig's three bands",
-    "develop": "four develop rubbers",
-    "sealed": "16 held-out rubbers",
+    "bands": "rig (3)",
+    "develop": "develop (4)",
+    "sealed": "held-out (16)",
 }
 
 
 def table(contents: dict[str, dict]) -> list[str]:
     """The table of docs/identification.md, of the reports of all sets."""
     rows = [
-        "| rubbers | recorded by | recordings | size of a recording's bias, mean (worst) | launches"
-        " inside, mean of the bands (least band; least recording) | median width |",
+        "| rubbers | recorded by | recordings | size of the bias, mean (worst) | inside,"
+        " mean of bands (least band; least recording) | width |",
         "|---|---|---:|---:|---:|---:|",
     ]
     percent = "{:.0f} %".format

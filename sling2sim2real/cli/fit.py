@@ -207,7 +207,7 @@ def _link(recording: Path, target: Path) -> None:
             link(parts[0], temporary)
     else:
         with replacing_folder(target) as temporary:
-            for part in [*parts, *bag.metadata_of(recording)]:
+            for part in parts:
                 link(part, temporary / part.name)
 
 

@@ -13,7 +13,10 @@ import warp as wp
 from sling2sim2real.base.native import built_once, text_of
 
 SAMPLES = 3  # simulated points an edge of the tube
-RINGS, AROUND = 125, 8  # vertices along the band and around it: as many as a measured cloud has
+RINGS, RING_VERTICES = (
+    125,
+    8,
+)  # vertices along the band and around it: as many as a measured cloud has
 
 
 @built_once
@@ -47,9 +50,11 @@ def chamfer_kernel(
     if surface == "tube":
         macros |= {"PARTS": edges, "VERTICES": SAMPLES}
     else:
-        macros |= {"PARTS": RINGS, "VERTICES": AROUND}
+        macros |= {"PARTS": RINGS, "VERTICES": RING_VERTICES}
         for name, turn in (("COSINES", math.cos), ("SINES", math.sin)):
-            numbers = (f"{turn(2 * math.pi * k / AROUND):.9f}f" for k in range(AROUND))
+            numbers = (
+                f"{turn(2 * math.pi * k / RING_VERTICES):.9f}f" for k in range(RING_VERTICES)
+            )
             macros[name] = "{" + ", ".join(numbers) + "}"
     paths = (Path(__file__).with_name(f"{name}.h") for name in ("lanes", surface, "chamfer"))
 

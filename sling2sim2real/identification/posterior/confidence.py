@@ -135,7 +135,7 @@ def _clocks(density: Identified) -> dict:
         name: {"value": value, "low": value - wide[i], "high": value + wide[i], "unit": "s"}
         for name, value, i in (
             ("release_time", time, release),
-            ("camera_delay", -nuisances[camera] - density.recordings[0].moved, camera),
+            ("camera_delay", -nuisances[camera] - density.recordings[0].camera_shift, camera),
         )
     }
 
@@ -186,6 +186,6 @@ def _launches(density: Identified) -> list[dict]:
             "z_without_it": None if np.isnan(score) else float(score),
         }
         for draw, landing, gap, score in zip(
-            launches.draws, launches.landings, expansion.left, scores, strict=True
+            launches.draws, launches.landings, expansion.log_ratio, scores, strict=True
         )
     ]

@@ -47,7 +47,7 @@ from sling2sim2real.simulator.rubber import NEO_HOOKEAN, RUBBER
 
 Count = Annotated[int, Field(ge=0)]
 Unit = Annotated[str, Field(pattern=r"^[A-Za-z0-9/%]{0,12}$")]
-REACH = {row.name: row.reach for row in TABLE if isinstance(row, Parameter)}
+BOUNDS = {row.name: row.reach for row in TABLE if isinstance(row, Parameter)}
 
 
 def _field(row: Parameter) -> Any:
@@ -67,7 +67,7 @@ class ThetaValues(create_model("_ThetaValues", __base__=Section, **_FIELDS)):
 
 
 class Nuisances(Section):
-    air_drag: Annotated[float, Range(*REACH["air_drag"])] | None = None
+    air_drag: Annotated[float, Range(*BOUNDS["air_drag"])] | None = None
 
 
 class RecordedPull(Section):
@@ -155,8 +155,8 @@ class ThetaFile(JsonRecord):
     theta: ThetaValues
     history: RecordedPull | None = None
     nuisances: Nuisances = Nuisances()
-    turn_damping: Annotated[float, Range(*REACH["turn_damping"])] = 0.0
-    returned_share: Annotated[float, Range(*REACH["returned_share"])] = 1.0
+    turn_damping: Annotated[float, Range(*BOUNDS["turn_damping"])] = 0.0
+    returned_share: Annotated[float, Range(*BOUNDS["returned_share"])] = 1.0
     mounted: bool = True
     loss: dict[Name, float] = {}
     rollouts: Count = 0

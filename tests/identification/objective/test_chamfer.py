@@ -7,7 +7,7 @@ from scipy.spatial.distance import cdist
 from sling2sim2real.base.native import wp
 from sling2sim2real.identification.objective.chamfer import LANES, Chamfer
 from sling2sim2real.identification.objective.kernels import (
-    AROUND,
+    RING_VERTICES,
     RINGS,
     SAMPLES,
     chamfer_kernel,
@@ -52,7 +52,7 @@ def by_tube(cloud: np.ndarray, line: np.ndarray, rest: np.ndarray) -> float:
 
 
 def vertices(line: np.ndarray, rest: np.ndarray, camera: np.ndarray) -> np.ndarray:
-    """The simulated cloud of a centre line (L, 3) in float64, (RINGS * AROUND, 3)."""
+    """The simulated cloud of a centre line (L, 3) in float64, (RINGS * RING_VERTICES, 3)."""
     edge, arc = np.diff(line.astype(float), axis=0), np.concatenate([[0.0], np.cumsum(rest)])
     length = np.linalg.norm(edge, axis=1)
     at = (np.arange(RINGS) + 0.5) / RINGS * arc[-1]
@@ -61,7 +61,7 @@ def vertices(line: np.ndarray, rest: np.ndarray, camera: np.ndarray) -> np.ndarr
     along = edge[on] / length[on][:, None]
     first = np.cross(np.cross(along, camera - centre), along)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    angle = 2 * np.pi * np.arange(AROUND) / AROUND
+    angle = 2 * np.pi * np.arange(RING_VERTICES) / RING_VERTICES
     around = np.multiply.outer(np.cos(angle), first)
     around += np.multiply.outer(np.sin(angle), np.cross(along, first))
     thick = RADIUS * np.sqrt(rest / np.maximum(length, rest / 4))[on]
@@ -121,7 +121,7 @@ def test_only_the_side_that_the_camera_sees_counts() -> None:
 def test_of_a_mesh_the_side_that_no_camera_sees_counts_too() -> None:
     """A cloud on the ridge: a vertex at the angle a is 2 R sin(a / 2) away."""
     distance = chamfer_of([facing(20_000)], FAR_UP, "mesh")(straight(1)[None])[0, 0]
-    angle = 2 * np.pi * np.arange(AROUND) / AROUND
+    angle = 2 * np.pi * np.arange(RING_VERTICES) / RING_VERTICES
     back, there = (2 * RADIUS * np.abs(np.sin(angle / 2))).mean(), LENGTH / RINGS / 4
     assert distance == pytest.approx((back + there) / 2, rel=0.01)
 

@@ -44,7 +44,7 @@ class Case:
 
     def expanded(self):
         recording = object.__new__(Likelihood)
-        recording.tolerances, recording.moved = self.tolerances, 0.0
+        recording.tolerances, recording.camera_shift = self.tolerances, 0.0
         camera = self.nuisance_slopes[1]
         form = recording._form(self.residuals, self.gap, camera)
         parts = self.gap, self.slopes, self.nuisance_slopes, 0 * self.gap
@@ -123,7 +123,9 @@ def test_the_misfit_has_the_linear_ones_at_their_best_and_the_simulated_as_they_
     linear = rows[:, PHI + INNER :]
     left = aim - linear @ np.linalg.lstsq(linear, aim, rcond=None)[0]
     assert expansion.misfit == pytest.approx(left @ left, rel=1e-9)
-    np.testing.assert_allclose(-expansion.left[: len(case.gap)], left[: len(case.gap)], rtol=1e-6)
+    np.testing.assert_allclose(
+        -expansion.residual[: len(case.gap)], left[: len(case.gap)], rtol=1e-6
+    )
 
 
 def test_elimination_leaves_of_any_residuals_what_least_squares_does(case):

@@ -126,7 +126,7 @@ def test_the_fit_keeps_the_launches_of_its_mode():
     first, second = curves(2)
     launches = Launches(second)
     result = fit([first], space(), START, launches=launches)
-    np.testing.assert_array_equal(result.launches.left, second.seen - curve(result.phi))
+    np.testing.assert_array_equal(result.launches.log_ratio, second.seen - curve(result.phi))
 
 
 def test_a_step_into_failure_is_taken_shorter():

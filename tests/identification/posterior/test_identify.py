@@ -68,11 +68,13 @@ def test_what_moves_a_whole_picture_of_the_recoil_counts_as_one_error(first) -> 
     bins = np.flatnonzero(seen.picture == picture)
     gone = seen.travelled()[bins[0]]
     for signs, repeated in ((1.0, np.sqrt(len(bins))), ((-1.0) ** np.arange(len(bins)), 1.0)):
-        left = np.zeros_like(expansion.left)
+        left = np.zeros_like(expansion.residual)
         left[count + bins] = 2e-3 * signs * weight[count + bins]
-        discrepancy = replace(expansion, left=left).recoil_discrepancy
+        discrepancy = replace(expansion, residual=left).recoil_discrepancy
         assert discrepancy == pytest.approx(2e-3 / gone * repeated, rel=0.25)
-        wider = first.recordings[0].with_wider_tolerances(replace(expansion, left=left)).tolerances
+        wider = (
+            first.recordings[0].with_wider_tolerances(replace(expansion, residual=left)).tolerances
+        )
         assert wider.recoil == max(first.recordings[0].tolerances.recoil, discrepancy)
 
 

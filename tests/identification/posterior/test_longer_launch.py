@@ -32,7 +32,7 @@ def summary(params):
         told = LaunchLikelihood(observed, sling, setup).expand(
             coordinates.parameters, phi, coordinates.steps
         )
-        return precision + told.hessian, told.gradient
+        return precision + told.landed.hessian, told.landed.gradient
 
     precision = np.diag(coordinates.precision + 1e2)  # as if recordings showed each within 0.1
     return coordinates.names, precision, by

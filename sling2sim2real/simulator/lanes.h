@@ -25,6 +25,7 @@ const bool backwards = member > DOFS;                     // this chain begins a
 #define ALL(mask) __all_sync(~0u, mask)
 #define SQRT(x) sqrt(x)
 #define UNROLL _Pragma("unroll")
+#define INLINED
 auto team_maximum = [](real x) -> real {
   for (int reach = 1; reach < TEAM; reach *= 2) {
     const real other = __shfl_xor_sync(~0u, x, reach);
@@ -56,6 +57,7 @@ auto root = [](real x) -> real { real y; for (int k = 0; k < WIDTH; ++k) y[k] = 
 #define ALL(mask) all_lanes(mask)
 #define SQRT(x) root(x)
 #define UNROLL _Pragma("clang loop unroll(full)")
+#define INLINED __attribute__((always_inline))            // else what the lambda captures lies in memory
 auto team_maximum = [](real x) -> real { return x; };
 auto join_chains = [](real (&)[COLUMNS][DOFS]) {};
 #endif

@@ -117,6 +117,8 @@ auto add_joint = [&](int i, bool from_frame, real (&own)[45], real (&f)[DOFS], r
     tw[c] = (scalar)-0.5 * to_p[3 + c]; tw[3 + c] = (scalar)0.5 * to_p[c];
     tw_next[c] = (scalar)0.5 * from_p[3 + c]; tw_next[3 + c] = (scalar)-0.5 * from_p[c];
   }
+  real gradient[6];  // by this section's directors
+  UNROLL for (int c = 0; c < 6; ++c) gradient[c] = from_frame ? tw_next[c] : tw[c];
   real twist = (scalar)-0.5 * (dot(to_p, from_p + 3) - dot(to_p + 3, from_p)), size = zero;
   UNROLL for (int c = 0; c < 6; ++c) {
     twist += tw[c] * from[c] + tw_next[c] * to[c];
@@ -130,7 +132,6 @@ auto add_joint = [&](int i, bool from_frame, real (&own)[45], real (&f)[DOFS], r
   const real hb = kb * (one + damp_shape), coupled = zero + (to_frame ? (scalar)0 : (scalar)1);
   if (fresh && !from_frame) { STAGED(BEND, i) = coupled * hb; STAGED(TWISTING, i) = coupled * kt; }
   UNROLL for (int m = 0; m < 6; ++m) {
-    const real* gradient = from_frame ? tw_next : tw;
     const real bend = kb * (from[m] - to[m] + damping * shape_damping * (from_t[m] - to_t[m]));
     f[3 + m] += (from_frame ? -bend : bend) - kt * twist * gradient[m];
     if (!from_frame) f_next[3 + m] = coupled * (-bend - kt * twist * tw_next[m]);
@@ -150,6 +151,12 @@ auto stage_section = [&](int i) {
     add_edge(i, own, f, f_next);
     const bool from_frame = (i == 0 && first_clamped) || (i == MIDDLE && gripped);
     for (int joint = from_frame ? 0 : 1; joint < 2; ++joint) add_joint(i, joint == 0, own, f, f_next);
+  }
+  if (i == MIDDLE - 1 || i == MIDDLE) {  // what the hand feels of this edge
+    const int side = 27 * (i - MIDDLE + 1);
+    UNROLL for (int c = 0; c < 3; ++c) hand_terms[side + c] = f_next[c];
+    if (fresh) UNROLL for (int c = 0; c < 6; ++c) hand_terms[side + 3 + c] = STAGED(STRETCH + c, i);
+    if (fresh) UNROLL for (int m = 0; m < 6; ++m) UNROLL for (int n = 0; n < 3; ++n) hand_terms[side + 9 + 3 * m + n] = own[LOWER(3 + m, n)];
   }
   STAGED(NOTHING, i) = zero;
   if (fresh) UNROLL for (int m = 0; m < 45; ++m) STAGED(OWN + m, i) = own[m];
@@ -182,13 +189,14 @@ auto coupling_column = [&](int i, int c, const real* own, real* column) {
 // of what edge e and its joint add to the block of section e + 1
 auto carried_column = [&](int e, int c, real* column) {
   const bool residual = c >= DOFS, node = c < 3, director = !residual && !node;
-  const int at = e < 0 ? 0 : e;
-  const real bend = STAGED(BEND, at), twisting = -STAGED(TWISTING, at) * STAGED(TWIST_NEXT + (director ? c - 3 : 0), at);
-  UNROLL for (int m = 0; m < DOFS; ++m) {
-    const int place = residual ? FORCE_NEXT + m : m >= 3 ? TWIST_NEXT + m - 3 : node ? STRETCH + LOWER(m, c) : NOTHING;
-    const real there = STAGED(place, at);
-    const bool absent = e < 0 || (director && m < 3) || (node && m >= 3);
-    column[m] = absent ? zero : director ? twisting * there + (m == c ? bend : zero) : there;
+  const real bend = STAGED(BEND, e), twisting = -STAGED(TWISTING, e) * STAGED(TWIST_NEXT + (director ? c - 3 : 0), e);
+  UNROLL for (int m = 0; m < 3; ++m) {
+    const real there = STAGED(residual ? FORCE_NEXT + m : node ? STRETCH + LOWER(m, c) : NOTHING, e);
+    column[m] = director ? zero : there;
+  }
+  UNROLL for (int m = 3; m < DOFS; ++m) {
+    const real there = STAGED((residual ? FORCE_NEXT : TWIST_NEXT - 3) + m, e);
+    column[m] = residual ? there : node ? zero : twisting * there + (m == c ? bend : zero);
   }
 };
 
@@ -198,9 +206,9 @@ auto hand_force = [&](int c, real scale) -> real {
   UNROLL for (int side = 0; side < 2; ++side) {
     const int e = MIDDLE - 1 + side;
     real after = zero;
-    UNROLL for (int n = 0; n < 3; ++n) after += STAGED(STRETCH + LOWER(c, n), e) * (CHANGE(n, e + 1) - CHANGE(n, e));
-    UNROLL for (int n = 0; n < 6; ++n) after -= STAGED(OWN + LOWER(3 + n, c), e) * CHANGE(3 + n, e);
-    after = STAGED_FORCE_NEXT(c, e) - scale * after;
+    UNROLL for (int n = 0; n < 3; ++n) after += hand_terms[27 * side + 3 + LOWER(c, n)] * (CHANGE(n, e + 1) - CHANGE(n, e));
+    UNROLL for (int n = 0; n < 6; ++n) after -= hand_terms[27 * side + 9 + 3 * n + c] * CHANGE(3 + n, e);
+    after = hand_terms[27 * side + c] - scale * after;
     force += side ? -after : after;
   }
   return force;

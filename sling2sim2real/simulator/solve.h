@@ -17,9 +17,9 @@ const int CHAIN_END = backwards ? SECTIONS - 1 - MEET : MEET;  // number of MEET
 real change = zero, imbalance = zero;   // longest entry of Newton's step [m]; largest residual [N]
 real indefinite = zero, poison = zero;  // whether a pivot is not positive; no number as soon as anything is
 
-auto weigh_residual = [&](int i) {
+auto weigh_residual = [&](int i, real (&before)[DOFS]) {
   UNROLL for (int m = 0; m < DOFS; ++m) {
-    const real f = STAGED_FORCE(m, i) + (i ? STAGED_FORCE_NEXT(m, i - 1) : zero);
+    const real f = STAGED_FORCE(m, i) + before[m];
     if (moves(i, m)) {
       imbalance = maximum(imbalance, magnitude(f) * (m < 3 ? (scalar)1 : per_edge));
       poison += f * zero;
@@ -148,19 +148,32 @@ auto substitute = [&]() {
 };
 
 // Newton's step from the state NOW into CHANGE; unless `fresh`, with the Hessian of the solve before
-auto solve = [&]() {
+auto solve = [&]() INLINED {
   real D[COLUMNS][DOFS], U[COLUMNS][DOFS], next[COLUMNS][DOFS], inverse[DOFS], own_inverse[COLUMNS], next_residual[COLUMNS];
   change = imbalance = poison = zero;
   if (fresh) indefinite = inexact = zero;
-  WAIT_FOR_TEAM;
-  for (int i = member; i < SECTIONS; i += TEAM) stage_section(i);
-  WAIT_FOR_TEAM;
-  for (int i = member; i < SECTIONS; i += TEAM) weigh_residual(i);
+  real before[DOFS];
+  UNROLL for (int m = 0; m < DOFS; ++m) before[m] = zero;
+  if (TEAM > 1) {
+    WAIT_FOR_TEAM;
+    for (int i = member; i < SECTIONS; i += TEAM) stage_section(i);
+    WAIT_FOR_TEAM;
+    for (int i = member; i < SECTIONS; i += TEAM) {
+      UNROLL for (int m = 0; m < DOFS; ++m) before[m] = i ? STAGED_FORCE_NEXT(m, i - 1) : zero;
+      weigh_residual(i, before);
+    }
+  }
   UNROLL for (int q = 0; q < COLUMNS; ++q) {
-    carried_column(backwards ? SECTIONS - 2 : -1, q + first_column, next[q]);
+    UNROLL for (int m = 0; m < DOFS; ++m) next[q][m] = zero;
+    if (backwards) carried_column(SECTIONS - 2, q + first_column, next[q]);
     next_residual[q] = own_inverse[q] = zero;
   }
   for (int at = 0; at <= CHAIN_END; ++at) {
+    if (TEAM == 1) {
+      stage_section(SECTION(at));
+      weigh_residual(SECTION(at), before);
+      UNROLL for (int m = 0; m < DOFS; ++m) before[m] = STAGED_FORCE_NEXT(m, SECTION(at));
+    }
     if (!fresh) { eliminate_residual(at, next_residual); continue; }
     if (SECTION(at) == MEET) join_chains(next);
     take_section(SECTION(at), D, U, next);

@@ -61,7 +61,7 @@ auto predict = [&](const scalar* row, const real (&target)[3]) {
 //            last change, or follows one that was cut, is rejected.
 //
 // Slings that have settled stay as they are, so that one never depends on its neighbours. Returns the iterations.
-auto newton = [&](real (&reaction)[3]) -> int {
+auto newton = [&](real (&reaction)[3]) INLINED -> int {
   real settled = outcome != zero ? one : zero;
   real last_change = zero, full_step = zero;  // of the step before: its size, and whether it was made whole
   int iteration = 0;

@@ -152,12 +152,6 @@ auto stage_section = [&](int i) {
     const bool from_frame = (i == 0 && first_clamped) || (i == MIDDLE && gripped);
     for (int joint = from_frame ? 0 : 1; joint < 2; ++joint) add_joint(i, joint == 0, own, f, f_next);
   }
-  if (i == MIDDLE - 1 || i == MIDDLE) {  // what the hand feels of this edge
-    const int side = 27 * (i - MIDDLE + 1);
-    UNROLL for (int c = 0; c < 3; ++c) hand_terms[side + c] = f_next[c];
-    if (fresh) UNROLL for (int c = 0; c < 6; ++c) hand_terms[side + 3 + c] = STAGED(STRETCH + c, i);
-    if (fresh) UNROLL for (int m = 0; m < 6; ++m) UNROLL for (int n = 0; n < 3; ++n) hand_terms[side + 9 + 3 * m + n] = own[LOWER(3 + m, n)];
-  }
   STAGED(NOTHING, i) = zero;
   if (fresh) UNROLL for (int m = 0; m < 45; ++m) STAGED(OWN + m, i) = own[m];
   UNROLL for (int m = 0; m < DOFS; ++m) { STAGED_FORCE(m, i) = f[m]; STAGED_FORCE_NEXT(m, i) = f_next[m]; }
@@ -206,9 +200,9 @@ auto hand_force = [&](int c, real scale) -> real {
   UNROLL for (int side = 0; side < 2; ++side) {
     const int e = MIDDLE - 1 + side;
     real after = zero;
-    UNROLL for (int n = 0; n < 3; ++n) after += hand_terms[27 * side + 3 + LOWER(c, n)] * (CHANGE(n, e + 1) - CHANGE(n, e));
-    UNROLL for (int n = 0; n < 6; ++n) after -= hand_terms[27 * side + 9 + 3 * n + c] * CHANGE(3 + n, e);
-    after = hand_terms[27 * side + c] - scale * after;
+    UNROLL for (int n = 0; n < 3; ++n) after += STAGED(STRETCH + LOWER(c, n), e) * (CHANGE(n, e + 1) - CHANGE(n, e));
+    UNROLL for (int n = 0; n < 6; ++n) after -= STAGED(OWN + LOWER(3 + n, c), e) * CHANGE(3 + n, e);
+    after = STAGED_FORCE_NEXT(c, e) - scale * after;
     force += side ? -after : after;
   }
   return force;

@@ -17,9 +17,9 @@ const int CHAIN_END = backwards ? SECTIONS - 1 - MEET : MEET;  // number of MEET
 real change = zero, imbalance = zero;   // longest entry of Newton's step [m]; largest residual [N]
 real indefinite = zero, poison = zero;  // whether a pivot is not positive; no number as soon as anything is
 
-auto weigh_residual = [&](int i, real (&before)[DOFS]) {
+auto weigh_residual = [&](int i) {
   UNROLL for (int m = 0; m < DOFS; ++m) {
-    const real f = STAGED_FORCE(m, i) + before[m];
+    const real f = STAGED_FORCE(m, i) + (i ? STAGED_FORCE_NEXT(m, i - 1) : zero);
     if (moves(i, m)) {
       imbalance = maximum(imbalance, magnitude(f) * (m < 3 ? (scalar)1 : per_edge));
       poison += f * zero;
@@ -152,28 +152,16 @@ auto solve = [&]() INLINED {
   real D[COLUMNS][DOFS], U[COLUMNS][DOFS], next[COLUMNS][DOFS], inverse[DOFS], own_inverse[COLUMNS], next_residual[COLUMNS];
   change = imbalance = poison = zero;
   if (fresh) indefinite = inexact = zero;
-  real before[DOFS];
-  UNROLL for (int m = 0; m < DOFS; ++m) before[m] = zero;
-  if (TEAM > 1) {
-    WAIT_FOR_TEAM;
-    for (int i = member; i < SECTIONS; i += TEAM) stage_section(i);
-    WAIT_FOR_TEAM;
-    for (int i = member; i < SECTIONS; i += TEAM) {
-      UNROLL for (int m = 0; m < DOFS; ++m) before[m] = i ? STAGED_FORCE_NEXT(m, i - 1) : zero;
-      weigh_residual(i, before);
-    }
-  }
+  WAIT_FOR_TEAM;
+  for (int i = member; i < SECTIONS; i += TEAM) stage_section(i);
+  WAIT_FOR_TEAM;
+  for (int i = member; i < SECTIONS; i += TEAM) weigh_residual(i);
   UNROLL for (int q = 0; q < COLUMNS; ++q) {
     UNROLL for (int m = 0; m < DOFS; ++m) next[q][m] = zero;
     if (backwards) carried_column(SECTIONS - 2, q + first_column, next[q]);
     next_residual[q] = own_inverse[q] = zero;
   }
   for (int at = 0; at <= CHAIN_END; ++at) {
-    if (TEAM == 1) {
-      stage_section(SECTION(at));
-      weigh_residual(SECTION(at), before);
-      UNROLL for (int m = 0; m < DOFS; ++m) before[m] = STAGED_FORCE_NEXT(m, SECTION(at));
-    }
     if (!fresh) { eliminate_residual(at, next_residual); continue; }
     if (SECTION(at) == MEET) join_chains(next);
     take_section(SECTION(at), D, U, next);

@@ -38,7 +38,7 @@ enum { OWN = 0, STRETCH = 45, TWIST = 51, TWIST_NEXT = 57, BEND = 63, TWISTING =
 enum { STORED_COUPLING = DOFS, STORED_SOLUTION = 2 * DOFS, STORED_INVERSE, STORED_SIZE };
 #if defined(__CUDA_ARCH__)
 const int COLUMN_LENGTH = (DOFS + 3) / 4 * 4;
-__shared__ scalar staged[STAGED_SIZE * (SECTIONS | 1)], hand_terms[54];
+__shared__ scalar staged[STAGED_SIZE * (SECTIONS | 1)];
 // a section's columns of U for the whole chain; two sections in turn
 __shared__ __align__(16) scalar shared_columns[4 * (DOFS + 1) * COLUMN_LENGTH];
 auto factors = work.data + (size_t)sling * (MIDDLE + 1) * STORED_SIZE * TEAM + first_of_chain;
@@ -50,9 +50,9 @@ auto factors = work.data + (size_t)sling * (MIDDLE + 1) * STORED_SIZE * TEAM + f
   if (first_column <= DOFS) { UNROLL for (int k = 0; k < DOFS; ++k) SHARED_COLUMN(columns, at, first_column, k) = columns[0][k]; } \
   WAIT_FOR_TEAM
 #else
-real staged[STAGED_SIZE], hand_terms[54];  // a section as the chain comes to it
-auto factors = OF_SLING(work, SECTIONS * STORED_SIZE * COLUMNS);
-#define STAGED(v, i) staged[v]
+auto staged = OF_SLING(work, SECTIONS * (STORED_SIZE * COLUMNS + STAGED_SIZE));
+auto factors = staged + SECTIONS * STAGED_SIZE;
+#define STAGED(v, i) staged[(i) * STAGED_SIZE + (v)]
 #define STORED(at, row, column) factors[((at) * STORED_SIZE + (row)) * COLUMNS + (column)]
 #define SHARED_COLUMN(columns, at, column, row) columns[column][row]
 #define SHARE_COLUMNS(columns, at)

@@ -55,24 +55,23 @@ auto take_section = [&](int i, real (&D)[COLUMNS][DOFS], real (&U)[COLUMNS][DOFS
 
 // LDL' of D, whose columns become multipliers below the diagonal; U is solved forwards with it. `inverse`: 1 / pivot
 auto factorise = [&](real (&D)[COLUMNS][DOFS], real (&U)[COLUMNS][DOFS], real (&inverse)[DOFS], real (&own_inverse)[COLUMNS]) {
-  real multiplier[DOFS][DOFS];
   UNROLL for (int k = 0; k < DOFS; ++k) {
+    real multiplier[DOFS];
     const real pivot = ENTRY(D, k, k);
     indefinite = pivot > zero ? indefinite : one;
     inverse[k] = one / pivot;
-    UNROLL for (int m = k + 1; m < DOFS; ++m) multiplier[k][m] = ENTRY(D, k, m) * inverse[k];
+    UNROLL for (int m = k + 1; m < DOFS; ++m) multiplier[m] = ENTRY(D, k, m) * inverse[k];
     UNROLL for (int q = COLUMNS - 1; q >= 0; --q) {  // column k last: the others read it
       const int c = q + first_column;
       const real above = ROW_OF_OWN(D, k, q < DOFS ? q : 0);
       UNROLL for (int m = k + 1; m < DOFS; ++m) {
-        if (c > k && c < DOFS && m >= LOWER_PART_FROM(c)) D[q][m] -= multiplier[k][m] * above;
-        if (c == k) D[q][m] = multiplier[k][m];
+        if (c > k && c < DOFS && m >= LOWER_PART_FROM(c)) D[q][m] -= multiplier[m] * above;
+        if (c == k) D[q][m] = multiplier[m];
       }
       if (c == k) own_inverse[q] = inverse[k];
     }
+    UNROLL for (int q = 0; q < COLUMNS; ++q) UNROLL for (int m = k + 1; m < DOFS; ++m) U[q][m] -= multiplier[m] * U[q][k];
   }
-  UNROLL for (int q = 0; q < COLUMNS; ++q)
-    UNROLL for (int k = 0; k < DOFS; ++k) UNROLL for (int m = k + 1; m < DOFS; ++m) U[q][m] -= multiplier[k][m] * U[q][k];
 };
 
 // Schur complement into the next section; what the back substitution needs is stored

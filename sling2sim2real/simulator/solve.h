@@ -55,23 +55,24 @@ auto take_section = [&](int i, real (&D)[COLUMNS][DOFS], real (&U)[COLUMNS][DOFS
 
 // LDL' of D, whose columns become multipliers below the diagonal; U is solved forwards with it. `inverse`: 1 / pivot
 auto factorise = [&](real (&D)[COLUMNS][DOFS], real (&U)[COLUMNS][DOFS], real (&inverse)[DOFS], real (&own_inverse)[COLUMNS]) {
+  real multiplier[DOFS][DOFS];
   UNROLL for (int k = 0; k < DOFS; ++k) {
-    real multiplier[DOFS];
     const real pivot = ENTRY(D, k, k);
     indefinite = pivot > zero ? indefinite : one;
     inverse[k] = one / pivot;
-    UNROLL for (int m = k + 1; m < DOFS; ++m) multiplier[m] = ENTRY(D, k, m) * inverse[k];
+    UNROLL for (int m = k + 1; m < DOFS; ++m) multiplier[k][m] = ENTRY(D, k, m) * inverse[k];
     UNROLL for (int q = COLUMNS - 1; q >= 0; --q) {  // column k last: the others read it
       const int c = q + first_column;
       const real above = ROW_OF_OWN(D, k, q < DOFS ? q : 0);
       UNROLL for (int m = k + 1; m < DOFS; ++m) {
-        if (c > k && c < DOFS && m >= LOWER_PART_FROM(c)) D[q][m] -= multiplier[m] * above;
-        if (c == k) D[q][m] = multiplier[m];
+        if (c > k && c < DOFS && m >= LOWER_PART_FROM(c)) D[q][m] -= multiplier[k][m] * above;
+        if (c == k) D[q][m] = multiplier[k][m];
       }
       if (c == k) own_inverse[q] = inverse[k];
     }
-    UNROLL for (int q = 0; q < COLUMNS; ++q) UNROLL for (int m = k + 1; m < DOFS; ++m) U[q][m] -= multiplier[m] * U[q][k];
   }
+  UNROLL for (int q = 0; q < COLUMNS; ++q)
+    UNROLL for (int k = 0; k < DOFS; ++k) UNROLL for (int m = k + 1; m < DOFS; ++m) U[q][m] -= multiplier[k][m] * U[q][k];
 };
 
 // Schur complement into the next section; what the back substitution needs is stored
@@ -123,16 +124,18 @@ auto eliminate_residual = [&](int at, real (&next)[COLUMNS]) {
 auto substitute = [&]() {
   real after[COLUMNS];  // of the chain's section after this one
   UNROLL for (int q = 0; q < COLUMNS; ++q) after[q] = zero;
+  BEGIN_READING_AHEAD(CHAIN_END);
   for (int at = CHAIN_END; at >= 0; --at) {
+    READ_AHEAD(at);
     real x[COLUMNS];
     UNROLL for (int q = 0; q < COLUMNS; ++q) {
       const int c = q + first_column < DOFS ? q + first_column : 0;
-      x[q] = STORED(at, STORED_SOLUTION, c);
-      if (at < CHAIN_END) UNROLL for (int m = 0; m < DOFS; ++m) x[q] -= STORED(at, STORED_COUPLING + m, c) * OF_COLUMN(after, m);
+      x[q] = READ(at, STORED_SOLUTION, c);
+      if (at < CHAIN_END) UNROLL for (int m = 0; m < DOFS; ++m) x[q] -= READ(at, STORED_COUPLING + m, c) * OF_COLUMN(after, m);
     }
     UNROLL for (int k = DOFS - 1; k > 0; --k) {
       const real known = OF_COLUMN(x, k);
-      UNROLL for (int q = 0; q < COLUMNS; ++q) if (q + first_column < k) x[q] -= STORED(at, k, q + first_column) * known;
+      UNROLL for (int q = 0; q < COLUMNS; ++q) if (q + first_column < k) x[q] -= READ(at, k, q + first_column) * known;
     }
     UNROLL for (int q = 0; q < COLUMNS; ++q) {
       const int c = q + first_column;

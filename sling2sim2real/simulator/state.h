@@ -49,7 +49,18 @@ auto factors = work.data + (size_t)sling * (MIDDLE + 1) * STORED_SIZE * TEAM + f
 #define SHARE_COLUMNS(columns, at) \
   if (first_column <= DOFS) { UNROLL for (int k = 0; k < DOFS; ++k) SHARED_COLUMN(columns, at, first_column, k) = columns[0][k]; } \
   WAIT_FOR_TEAM
+// the back substitution reads a section ahead, so that it need not wait for the memory
+const int read_column = first_column < DOFS ? first_column : 0;
+#define BEGIN_READING_AHEAD(at) \
+  scalar now[STORED_SIZE], ahead[STORED_SIZE]; \
+  UNROLL for (int r = 1; r < STORED_SIZE; ++r) ahead[r] = STORED(at, r, read_column)
+#define READ_AHEAD(at) \
+  UNROLL for (int r = 1; r < STORED_SIZE; ++r) { now[r] = ahead[r]; ahead[r] = STORED(at ? at - 1 : 0, r, read_column); }
+#define READ(at, row, column) now[row]
 #else
+#define BEGIN_READING_AHEAD(at)
+#define READ_AHEAD(at)
+#define READ(at, row, column) STORED(at, row, column)
 auto staged = OF_SLING(work, SECTIONS * (STORED_SIZE * COLUMNS + STAGED_SIZE));
 auto factors = staged + SECTIONS * STAGED_SIZE;
 #define STAGED(v, i) staged[(i) * STAGED_SIZE + (v)]

@@ -24,8 +24,8 @@ from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.inputs import CardInputs, aims_of
 from sling2sim2real.card.write import write as write_card
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.results.mounting import Mounting
 from sling2sim2real.identification.results.theta import (
+    Mounting,
     ThetaFile,
     load_samples,
     load_theta,
@@ -35,6 +35,28 @@ from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.launching.trials.stretch import recorded_stretch
 from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.model import LaunchHistory
+
+KEPT = (  # settings that who uses the folder needs: what the stage `card` depends on
+    "force",
+    "launch",
+    "parameters",
+    "plan.frame",
+    "policy.targets",
+    "setup",
+    "sling",
+    "trials",
+)
+
+
+def kept(settings: Settings, method: str) -> dict[str, dict]:
+    """Of these, and of the method, what differs from the library's defaults."""
+    other, found = differences(settings, Settings.default()), {}
+    for place in (*KEPT, f"methods.{method}"):
+        section, _, key = place.partition(".")
+        values = other.get(section, {})
+        if values := {name: values[name] for name in values if key in ("", name)}:
+            found[section] = values
+    return found
 
 
 def identified(pair: Pair, root: str | Path = ".") -> Identification:
@@ -90,8 +112,7 @@ def write(pair: Pair, root: str | Path = ".") -> dict:
         folder = BandFolder(temporary)
         stored, policy = Stored(layout.policy(pair)), Stored.of_band(temporary)
         sizes = {name: getattr(found.band, name) for name in SIZES}
-        other = differences(found.settings, Settings.default())
-        other.pop("bands", None)
+        other = kept(found.settings, pair.method)
         BandFile(sizes, found.band.preconditioned, (), other).save(folder.band_file)
         found.save(folder.theta)
         shutil.copyfile(stored.network, policy.network)

@@ -22,7 +22,7 @@ from .api.simulation import simulate_batch as simulate_batch
 from .base.errors import UserError as UserError
 from .episode.episode import Episode as Episode
 from .identification.posterior.launches import Observed as Observed
-from .identification.results.mounting import Mounting as Mounting
+from .identification.results.theta import Mounting as Mounting
 from .settings import Settings as Settings
 from .simulator.model import LaunchHistory as LaunchHistory
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from pipeline.layout import Layout
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.objective.session import logging_evaluator
+from sling2sim2real.identification.objective.evaluate import logging_evaluator
 from sling2sim2real.identification.search import explore, rollouts_of
 from stages.start import pair_of_stage, run
 

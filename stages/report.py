@@ -7,7 +7,7 @@ Fails, and says which stage is missing, where an expected input is not there.
 
 from __future__ import annotations
 
-from pipeline.report.write import write
+from pipeline.report.report import write
 from stages.start import arguments, parameters, run
 
 

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from pipeline.layout import Layout
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.objective.session import law_entries, logging_evaluator
-from sling2sim2real.identification.results.confidence_file import save_confidence
+from sling2sim2real.episode.pull import launch_history
+from sling2sim2real.identification.objective.evaluate import logging_evaluator
+from sling2sim2real.identification.results.theta import law_entries, save_confidence
 from sling2sim2real.identification.search import explore, rollouts_of
 from stages.start import pair_of_stage, run
 
@@ -24,8 +25,9 @@ def main() -> None:
     recorded = pair.band, pair.method, episode, layout.clamps(pair)
     evaluate = logging_evaluator(f"search-{pair.key}", params, *recorded, rollouts)
     explore(params, pair.method, evaluate).save(layout.evaluations(pair))
-    entries = law_entries(episode, params.methods[pair.method].law)
-    save_confidence(layout.confidence(pair), pair.band, entries)
+    method = params.methods[pair.method]
+    entries = law_entries(method.law, launch_history(episode))
+    save_confidence(layout.confidence(pair), pair.band, entries, mounting=method.mounting)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Presets in params.yaml, and where the report of such a run is kept."""
 
+import json
 import os
 import signal
 import subprocess
@@ -59,7 +60,7 @@ def test_the_papers_preset_has_no_method_of_ours_and_searches_the_whole_box(tmp_
     params = load(path)
     run = [params.methods[pair.method] for pair in params.run.pairs.values()]
     assert len(run) == 16 and not any(method.mounting for method in run)
-    assert {method.law for method in run} == {"neo_hookean"} and not any(
+    assert {method.law for method in run} == {"corotated"} and not any(
         method.bounds for method in run
     )
     assert not params.methods["paper"].fixed
@@ -99,14 +100,15 @@ def test_a_report_is_stored_in_a_folder_of_its_preset(tmp_path) -> None:
         (reports / part).mkdir(parents=True)
         (reports / part / "a").write_text(part)
     links = "[a](figures/a) [b](bands/b/README.md) [c](../docs/c.md) [d](#d) [e](https://e.org)"
-    for file in ("README.md", "appendix.md", "run.js"):
+    for file in ("README.md", "appendix.md"):
         (reports / file).write_text(links + " [f](appendix.md#f)")
     earlier = reports / "presets/large/old"
     earlier.mkdir(parents=True)
-    folder = store_report(reports, "large")
+    folder = store_report(reports, "large", {"seconds": 3})
     assert folder == reports / "presets/large" and not earlier.exists()
     assert (folder / "README.md").read_text() == (
         "[a](figures/a) [b](../../bands/b/README.md) [c](../../../docs/c.md) [d](#d)"
         " [e](https://e.org) [f](appendix.md#f)"
     )
-    assert (folder / "tables/a").read_text() == "tables" and (folder / "run.js").exists()
+    assert (folder / "tables/a").read_text() == "tables"
+    assert json.loads((folder / "run.json").read_text()) == {"seconds": 3}

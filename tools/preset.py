@@ -4,8 +4,8 @@
 
 The preset's keys are written into params.yaml, for `git diff` to show and `git checkout` to take
 back (of reports and dvc.lock too, for its results); then `sling flow`. Its report is copied to
-reports/presets/, and `seconds` in reports/run.js is how long it took. Killed, it goes on where it
-was when it is called again, whose time is then that of the rest.
+reports/presets/, with run.json: where it ran, and how many seconds it took. Killed, it goes on
+where it was when it is called again, whose time is then that of the rest.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from pipeline.params import Params  # noqa: E402
-from pipeline.report.run import write_run  # noqa: E402
 from sling2sim2real.base import errors  # noqa: E402
 from sling2sim2real.base.errors import UserError  # noqa: E402
-from sling2sim2real.base.files import replacing_folder, write_text  # noqa: E402
+from sling2sim2real.base.files import replacing_folder, write_json, write_text  # noqa: E402
+from sling2sim2real.base.machine import commit, cores, processor  # noqa: E402
 
 PRESETS = ROOT / "presets"
-PAGES, PARTS = ("README.md", "appendix.md"), ("figures", "tables", "run.js")
+PAGES, PARTS = ("README.md", "appendix.md"), ("figures", "tables")
 ELSEWHERE = re.compile(
     rf"(\]\()(?!https?:|#|(?:{'|'.join(map(re.escape, (*PAGES, *PARTS)))})(?=[/#)]))"
 )
@@ -76,8 +76,10 @@ def status_of(run: list[str]) -> int:
     return process.wait()
 
 
-def store_report(reports: Path, name: str) -> Path:
+def store_report(reports: Path, name: str, about: dict) -> Path:
     """Copy a run's report to reports/presets/<name>/; links to what is not copied still lead there.
+
+    `about` it is written beside, as run.json.
 
     Returns the folder. The bands' cards stay where they are: a later run replaces them.
     """
@@ -89,7 +91,8 @@ def store_report(reports: Path, name: str) -> Path:
             write_text(temporary / page, ELSEWHERE.sub(r"\1../../", text))
         for part in PARTS:
             source = reports / part
-            (shutil.copytree if source.is_dir() else shutil.copy)(source, temporary / part)
+            shutil.copytree(source, temporary / part)
+        write_json(temporary / "run.json", about)
     return folder
 
 
@@ -102,10 +105,13 @@ def main() -> int:
     start = time.monotonic()
     status = status_of(run)
     if status == 0:
-        took = {"runs": " ".join(run), "preset": name, "seconds": round(time.monotonic() - start)}
-        print(json.dumps(write_run(ROOT / "reports", **took), indent=2))
+        seconds = round(time.monotonic() - start)
+        about = {"runs": " ".join(run), "preset": name, "seconds": seconds}
+        about |= {"commit": commit(ROOT), "machine": f"{processor()}, {cores()} cores"}
+        print(json.dumps(about, indent=2))
         if not more:  # of all stages
-            print(f"its report: {store_report(ROOT / 'reports', name).relative_to(ROOT)}/README.md")
+            folder = store_report(ROOT / "reports", name, about)
+            print(f"its report: {folder.relative_to(ROOT)}/README.md")
     return status
 
 

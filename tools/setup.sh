@@ -23,13 +23,13 @@ apt() {
 # Shims answer to names that they cannot run, so each candidate is run.
 python=""
 for candidate in ${PYTHON:-python3.12 python3.11 python3}; do
-    if "$candidate" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))' \
+    if "$candidate" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))' \
         2>/dev/null; then
         python=$candidate
         break
     fi
 done
-[ -n "$python" ] || fail "Python 3.11 or 3.12 is needed and ${PYTHON:-python3} is not;" \
+[ -n "$python" ] || fail "Python 3.11, 3.12 or 3.13 is needed and ${PYTHON:-python3} is not;" \
     "install one, or name it: PYTHON=/path/to/python3.12 make setup"
 
 if [ ! -x .venv/bin/pip ]; then

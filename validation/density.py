@@ -12,13 +12,13 @@ import numpy as np
 
 from sling2sim2real.base.machine import cores
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.identify import search_and_fit
-from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.identification.identify import evaluations_of
 from sling2sim2real.identification.objective.evaluate import Evaluator
-from sling2sim2real.identification.objective.loss import TERMS, EpisodeLoss
-from sling2sim2real.identification.posterior import identify as posterior
+from sling2sim2real.identification.posterior.confidence import confidence
+from sling2sim2real.identification.posterior.identify import fit_posterior, recorded_history
 from sling2sim2real.identification.posterior.launches import Evidence, Observed
-from sling2sim2real.settings.identification import parameter_names
+from sling2sim2real.identification.results.evaluations import TERMS
+from sling2sim2real.settings.identification import POSTERIOR, parameter_names
 from sling2sim2real.simulator.launch import Launches, launch
 from sling2sim2real.simulator.model import ClampedBand, LaunchSetup
 from sling2sim2real.simulator.parameters import Parameters
@@ -64,19 +64,16 @@ def calibrated_by(
 
     Of another search than least squares it says "loss": the terms and the total of the best.
     """
-    box = SearchBox.of_method(params, method)
-    loss = EpisodeLoss.of(params, method, episodes[0], sling)
-    evaluate = Evaluator(episodes[0], sling, loss, box, workers=WORKERS)
-    history = posterior.recorded_history(sling, episodes)
-    setup = LaunchSetup.of(params.setup, params.sling, history)
-    evidence = Evidence(observed, setup)
-    identified = search_and_fit(
-        params, method, sling, episodes, evaluate, evidence=evidence, workers=WORKERS
-    )
-    density = identified.density
-    if density is None:
-        best = identified.evaluations.best_row()
+    evaluations = evaluations_of(params, method, Evaluator.of(params, method, episodes[0], sling))
+    setup = LaunchSetup.of(params.setup, params.sling, recorded_history(sling, episodes))
+    start = evaluations.best_parameters(params.methods[method].law)
+    if params.methods[method].search != POSTERIOR:
+        best = evaluations.best_row()
         description = {"loss": {name: best[name] for name in (*TERMS, "total")}}
-        return Calibrated(sling, setup, identified.theta), description
-    description = posterior.confidence(density)
-    return Calibrated(sling, setup, density.mode, density.parameters, density.samples), description
+        return Calibrated(sling, setup, start), description
+    evidence = Evidence(observed, setup)
+    density = fit_posterior(
+        params, method, sling, episodes, start, evidence=evidence, workers=WORKERS
+    )
+    found = Calibrated(sling, setup, density.mode, density.parameters, density.samples)
+    return found, confidence(density)

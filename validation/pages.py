@@ -37,12 +37,12 @@ def checks() -> list[str]:
 
 BLOCKS: dict[str, tuple[str, Callable[[], list[str]]]] = {  # by page: name of its marks, its lines
     "README.md": ("landings", headline.block),
-    "docs/faq.md": ("checks", checks),
+    "docs/reference/checks.md": ("checks", checks),
     "docs/identification.md": (
         "landings",
         lambda: landings.table({s: read(ROOT / landings.report_of(s)) for s in landings.SETS}),
     ),
-    "docs/paper.md": ("ablations", lambda: ablations.table(read(ROOT / headline.LARGE))),
+    "docs/paper.md": ("ablations", lambda: ablations.table(read(ROOT / ablations.LARGE))),
     "docs/recording.md": ("field", lambda: field.table(read(ROOT / field.REPORT))),
     "docs/times.md": ("times", lambda: times.table(read(ROOT / times.REPORT))),
 }

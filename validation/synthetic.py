@@ -14,11 +14,11 @@ import numpy as np
 
 from pipeline.params import Params
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.episode.signal import average, lowpass, uniform
-from sling2sim2real.identification.objective.loss import EpisodeLoss
+from sling2sim2real.episode.signal import average, cutoff_hz, lowpass, uniform
 from sling2sim2real.simulator.interaction import interact
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
+from sling2sim2real.simulator.replay import recorded_force
 
 DRAW = 0.35  # m
 THETA = (2e5, 0.45, 2e-3, 0.5, 0.5)  # of the band that is recorded
@@ -86,9 +86,8 @@ def recorded_yardstick(params: Params) -> tuple[ClampedBand, Episode]:
         for line in rollout.center_line[0]
     ]
     episode = replace(episode, clouds=ridges)
-    return sling, replace(
-        episode, force=EpisodeLoss.plain(params, episode, sling).filtered(rollout)[0]
-    )
+    cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
+    return sling, replace(episode, force=recorded_force(rollout, episode, cutoff)[0])
 
 
 def _ridge(line: np.ndarray, radius: float, camera: np.ndarray, count: int) -> np.ndarray:

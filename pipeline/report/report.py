@@ -1,95 +1,259 @@
-"""What every chapter, picture and page of the report is made from."""
+"""Write reports/: report and appendix with their pictures and pages, tables, summary.json."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
-from pipeline.layout import Layout
 from pipeline.params import Params
-from pipeline.report.landscape import Landscape, landscape
-from pipeline.report.paper import METHOD
-from pipeline.report.replay import MethodReplay, replay_method
-from pipeline.report.results import Result, Results, gather
+from pipeline.report import paper, tables
+from pipeline.report.data import Result, Run, gather
+from pipeline.report.figures import landings, search, simulation
+from pipeline.report.statistics import LEVEL, differences
+from pipeline.report.tables import markdown
+from sling2sim2real.base.files import replacing, write_json, write_text
+from sling2sim2real.base.target import TARGET_AREA
+from sling2sim2real.base.template import filled
 from sling2sim2real.drawing.canvas import P, Saving
-from sling2sim2real.drawing.styles import Styles, drawn, styles
-from sling2sim2real.launching.surface.stored import Stored
+from sling2sim2real.drawing.page import page
+from sling2sim2real.drawing.styles import drawn
+from sling2sim2real.identification.results.ranges import searched
+from sling2sim2real.settings.identification import POSTERIOR
+
+HERE = Path(__file__).parent
+HTML = {"README": "index", "appendix": "appendix"}  # names of pages
+LINK = re.compile(rf"\]\(((?:bands/[^)/]+/card/)?)({'|'.join(HTML)})\.md\)")
+CONVERGED = 5760  # rollouts by which seeds of the paper's search agree (docs/paper.md)
+TARGETS = 101  # of the policy's path that is drawn, from the nearest to the farthest
 
 
-@dataclass(frozen=True)
-class Report:
-    """All that ran, as it is shown.
+def write(params: Params, root: str | Path = ".") -> None:
+    """Write the report of everything in params.run. Raises UserError where an input is missing."""
+    report = Report(gather(params, root), Path(root, "reports"))
+    texts = {"README": report.results(), "appendix": report.appendix()}
+    for name, text in texts.items():
+        write_text(report.folder / f"{name}.md", text)
+        write_page(report.folder, name, text)
+    write_json(report.folder / "summary.json", tables.summary(report.run))
 
-    Attributes:
-        replays: By band and method; of the methods that are drawn.
-        styles: By method.
-        landscape: Of the first search that refines regions, with its result, where one did.
-        root: Of the project, with data/ and reports/.
+
+def write_page(folder: Path, name: str, text: str) -> None:
+    """Write <name>.md as HTML into `folder`, where its pictures lie: a file that needs no network.
+
+    Links to texts become links to their pages. Raises UserError.
     """
+    text = LINK.sub(lambda link: f"]({link[1]}{HTML[link[2]]}.html)", text)
+    title = "Sling2Sim2Real: " + ("report" if name == "README" else name)
+    write_text(folder / f"{HTML[name]}.html", page(text, folder, title))
 
-    params: Params
-    results: Results
-    replays: dict[str, dict[str, MethodReplay]]
-    styles: Styles
-    landscape: tuple[Result, Landscape] | None
-    root: Path
 
-    @classmethod
-    def of(cls, params: Params, root: Path) -> Report:
-        """Report on everything in params.run. Raises UserError where an input is missing."""
-        results = gather(params, root)
-        layout = Layout(root)
-        named = styles(dict.fromkeys(result.method for result in results))
-        replays = {band: _replays(params, results, band, layout) for band in results.methods}
-        searched = next((result for result in results if result.regions), None)
-        chart = searched and (
-            searched,
-            landscape(
-                params, searched, results.episodes[searched.band], layout.clamps(searched.pair)
-            ),
+@dataclass
+class Report:
+    """The texts of a run; writes the pictures and tables that they show into `folder`."""
+
+    run: Run
+    folder: Path
+
+    def __post_init__(self) -> None:
+        run, shown = self.run, drawn(self.run.shared)
+        self.replays = {
+            band: {m: simulation.replayed(run, of_band[m]) for m in of_band if m in shown}
+            for band, of_band in run.results.items()
+        }
+        launched = run.launched
+        self.aimed = launched.loc[launched.target.notna()]
+        self.main = {band: of_band[run.main] for band, of_band in run.results.items()}
+
+    def results(self) -> str:
+        """The first page: what came out, the paper's tables, its figures."""
+        run, params = self.run, self.run.params
+        outcome = tables.outcome(run)
+        known = tables.identified(run)
+        paper_tables = {2: (tables.identified_text(run, known), known)}
+        for count, methods in ((1, ()), (3, paper.OPTIMISERS), (4, paper.ABLATIONS)):
+            errors = tables.benchmark(run, methods)
+            if len(errors):
+                table = tables.benchmark_text(run, errors), tables.benchmark_records(errors)
+                paper_tables[count] = table
+        for count, (_, records) in paper_tables.items():
+            self._csv(f"table{count}", records)
+        hits = tables.hits(run)
+        return filled(
+            HERE / "README.md.j2",
+            run=run,
+            outcome=markdown(outcome),
+            virtual=(run.trials.source == "virtual").any(),
+            landings=outcome is not None and self._landings(),
+            doubts=doubts(run),
+            bands=[
+                (name, params.bands[recording.band], self._launched(name))
+                for name, recording in params.run.recordings.items()
+            ],
+            tables={n: markdown(t, repeats=False) for n, (t, _) in sorted(paper_tables.items())},
+            paper=tables.PAPER,
+            sources={source for table, _ in paper_tables.values() for source in table.source},
+            area=TARGET_AREA,
+            unconverged=self._unconverged(),
+            converged=CONVERGED,
+            trusted=any(result.confidence for result in run),
+            edges=(known.edge != "").any(),
+            overview=self._overview(),
+            search=self._search(),
+            hits=markdown(hits, repeats=False),
+            flights=hits is not None and self._flights(),
         )
-        return cls(params, results, replays, named, chart, root)
 
-    @property
-    def folder(self) -> Path:
-        return self.root / "reports"
+    def appendix(self) -> str:
+        """The second page: differences, predictions, searches, confidence, policies, budget."""
+        run, params = self.run, self.run.params
+        against = differences(run.launched, run.references)
+        if len(against):
+            self._csv("differences", tables.differences_records(against))
+        measured = run.launched.query("source == 'measured' and method == @run.main")
+        return filled(
+            HERE / "appendix.md.j2",
+            main=tables.called(run, run.main),
+            level=tables.percent(LEVEL),
+            differences=markdown(tables.differences_text(run, against), repeats=False),
+            predicted=markdown(tables.predicted(run), repeats=False),
+            measured={b: markdown(tables.launches(of)) for b, of in measured.groupby("band")},
+            pull=self._picture(
+                "pull",
+                "force against draw, residual force, distance of the clouds",
+                simulation.pull, run.episodes, self.replays, run.styles,
+            ),
+            losses=markdown(tables.losses(run), repeats=False),
+            convergence=self._convergence(),
+            policies=markdown(tables.policies(run), repeats=False),
+            training=self._training(),
+            explored=params.optimizer.population * (params.optimizer.generations + 1),
+            optimizer=params.optimizer,
+            policy=params.policy,
+            trials=params.trials,
+            rig=params.run.rig,
+        )  # fmt: skip
 
-    @property
-    def main(self) -> str:
-        """The method that the report is about first: that of the cards."""
-        return self.params.run.main
+    def _unconverged(self) -> int | None:
+        """Rollouts of each search of the paper's loss, where they are too few; else None."""
+        params = self.run.params
+        optimizer = params.optimizer
+        budget = optimizer.population * (optimizer.generations + 1) + optimizer.cma_rollouts
+        searches = {params.methods[result.method].search for result in self.run} - {POSTERIOR}
+        return budget if searches and budget < CONVERGED else None
 
-    @property
-    def references(self) -> tuple[str, ...]:
-        """What others are compared with: the main method, and the paper's where it ran too."""
-        theirs = (METHOD,) if METHOD in self.results.shared else ()
-        return tuple(dict.fromkeys((self.main, *theirs)))
+    def _csv(self, name: str, records: pd.DataFrame) -> None:
+        with replacing(self.folder / "tables" / f"{name}.csv") as temporary:
+            records.to_csv(temporary, index=False, float_format="%.4g", lineterminator="\n")
 
-    def shown(self, methods) -> Styles:
-        """The styles of methods, in the order of the run."""
-        return {method: style for method, style in self.styles.items() if method in methods}
-
-    def picture(
+    def _picture(
         self, name: str, alt: str, draw: Saving[P], *arguments: P.args, **named: P.kwargs
     ) -> str:
-        """Have `draw` write reports/figures/<name>.png; return the line that shows it."""
+        """Have `draw` write figures/<name>.png; return the line that shows it."""
         draw(self.folder / "figures" / f"{name}.png", *arguments, **named)
         return f"![{alt}](figures/{name}.png)\n"
 
-    def draws(self, result: Result, targets: np.ndarray) -> np.ndarray:
-        """The policy's draws (N, 2) [m] for targets (N,) [m]."""
-        return Stored(Layout(self.root).policy(result.pair)).draws(targets)
+    def _launched(self, name: str) -> bool:
+        return ((self.run.trials.name == name) & (self.run.trials.source != "predicted")).any()
+
+    def _shown(self, methods) -> dict:
+        """The styles of methods, in the order of the run."""
+        return {method: style for method, style in self.run.styles.items() if method in methods}
+
+    def _draws(self, result: Result) -> np.ndarray:
+        """The policy's draws (N, 2) [m], from the nearest to the farthest target."""
+        return result.policy.draws(np.linspace(*self.run.params.policy.targets, TARGETS))
+
+    def _landings(self) -> str | None:
+        if self.aimed.empty:
+            return None
+        shown = self._shown({*self.run.shared} & {*self.aimed.method})
+        alt = "how far from its target each launch landed"
+        return self._picture("landings", alt, landings.misses, self.aimed, self.run.least, shown)
+
+    def _overview(self) -> str | None:
+        run, (band, result) = self.run, next(iter(self.main.items()))
+        trials = self.aimed.loc[(self.aimed.band == band) & (self.aimed.method == run.main)]
+        if trials.empty:
+            return None
+        drawing = run.episodes[band], self.replays[band][run.main], self._draws(result), trials
+        alt, draw = "from a recording to launches", simulation.overview
+        return self._picture("overview", alt, draw, *drawing, run.styles[run.main])
+
+    def _search(self) -> tuple[str, str] | None:
+        """Method of the first search that refines regions, and its picture; None of none."""
+        result = next((result for result in self.run if result.regions), None)
+        if result is None:
+            return None
+        chart = search.landscape(self.run, result)
+        drawing = result, chart, searched(self.run.params, result.method)
+        alt = "exploration, regions, CMA-ES"
+        shown = self._picture("search", alt, search.search, *drawing)
+        return tables.called(self.run, result.method), shown
+
+    def _flights(self) -> tuple[str, str] | None:
+        """The first band whose flights are known, and their picture; None where there is none."""
+        for band in self.run.results:
+            trials = self.run.launched.query("band == @band and source == 'virtual'")
+            flew = {*trials.loc[trials.flight_y.notna()].method}
+            if flown := self._shown({self.run.main, *paper.BENCHMARK} & flew):
+                drawing = landings.flights, trials, self.run.params.setup, flown
+                return band, self._picture("flights", f"flights of {band}", *drawing)
+        return None
+
+    def _convergence(self) -> str | None:
+        """Searches on one loss, and the main one; None where no band has two."""
+        searches = {
+            band: {m: of for m, of in of_band.items() if m == self.run.main or self._printed(m)}
+            for band, of_band in self.run.results.items()
+        }
+        if all(len(of_band) < 2 for of_band in searches.values()):
+            return None
+        drawing = search.convergence, searches, self.run.styles
+        return self._picture("convergence", "loss of the best so far against rollouts", *drawing)
+
+    def _printed(self, method: str) -> bool:
+        """Whether a method minimises the printed loss."""
+        weights = dict(self.run.params.methods[method].weights)
+        return all(weight == (name in tables.TERMS) for name, weight in weights.items())
+
+    def _training(self) -> str:
+        curves = {
+            band: {method: of_band[method].training for method in self.run.shared}
+            for band, of_band in self.run.results.items()
+        }
+        drawing = search.training, curves, self.run.styles
+        return self._picture("training", "training error by iteration", *drawing)
 
 
-def _replays(
-    params: Params, results: Results, band: str, layout: Layout
-) -> dict[str, MethodReplay]:
-    """Replays of the methods that are drawn."""
-    episode, some = results.episodes[band], drawn(results.shared)
-    return {
-        method: replay_method(params, result.pair, episode, result.theta, layout)
-        for method, result in results.methods[band].items()
-        if method in some
-    }
+def doubts(run: Run) -> list[str]:
+    """What did not go well, a sentence each."""
+    trials, first, sentences = run.trials, run.params.run.first, []
+    for result in run:
+        mine = (trials.name == first[result.band].key) & (trials.method == result.method)
+        lost = trials.loc[mine].predicted_y.isna()
+        known, wrong = result.confidence, []
+        if lost.any():
+            wrong.append(f"{lost.sum()} of {len(lost)} launches could not be predicted.")
+        if not result.card["training"]["converged"]:
+            wrong.append("the policy did **not** converge in its own simulator.")
+        if not known.get("settled", True):
+            steps = known.get("steps", "all its")
+            wrong.append(
+                f"the fit had **not settled** after {steps} steps; do not rely on its intervals."
+            )
+        if known and not any(recording["pictures"] for recording in known["recordings"]):
+            wrong.append(
+                "no camera frame shows the recoil, so the damping is what other rubbers have; a"
+                " launch would say most."
+            )
+        name = f"{result.band}, {tables.called(run, result.method)}"
+        sentences += [f"⚠ {name}: {words}" for words in wrong]
+    return sentences + [
+        f"⚠ {band}: {count} measured launches name a method that does not run on this band."
+        for band, count in run.unused.items()
+        if count
+    ]

@@ -16,8 +16,7 @@ from sling2sim2real.base.files import write_json
 from sling2sim2real.base.layout import NotMade
 from sling2sim2real.base.schema import JsonRecord, Pose, read_json
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.results.mounting import Mounting
-from sling2sim2real.identification.results.theta import ThetaFile
+from sling2sim2real.identification.results.theta import Mounting, ThetaFile
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.quantities import QUANTITIES
 from sling2sim2real.settings import Settings

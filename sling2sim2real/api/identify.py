@@ -7,21 +7,15 @@ from collections.abc import Callable, Sequence
 from sling2sim2real.api.identification import METHOD, Identification, fork_of
 from sling2sim2real.api.model import Band, Model, Theta, with_band
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.machine import cores, devices, workers
+from sling2sim2real.base.machine import cores, workers
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.pull import launch_history
 from sling2sim2real.identification.clamps import ClampCalibration, calibrate_clamps
-from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
-from sling2sim2real.identification.objective.loss import EpisodeLoss
-from sling2sim2real.identification.posterior.identify import (
-    confidence,
-    fit_posterior,
-    theta_entries,
-)
+from sling2sim2real.identification.posterior.confidence import confidence, theta_entries
+from sling2sim2real.identification.posterior.identify import fit_posterior
 from sling2sim2real.identification.posterior.launches import Evidence, Observed
-from sling2sim2real.identification.results.mounting import Mounting
-from sling2sim2real.identification.results.theta import ThetaFile
+from sling2sim2real.identification.results.theta import Mounting, ThetaFile
 from sling2sim2real.identification.search import explore
 from sling2sim2real.launching.trials.stretch import recorded_stretch
 from sling2sim2real.settings import Settings
@@ -125,7 +119,7 @@ def starting_model(
         clamps = _clamps(episode, band, settings)
         mounting = Mounting.model_validate(vars(clamps))
         progress(f"mounting: clamps at {clamps.clamp_angle_deg:.0f} degrees")
-    evaluate = _evaluator(episode, _sling(band, settings, mounting), settings)
+    evaluate = Evaluator.of(settings, METHOD, episode, _sling(band, settings, mounting))
     explored = explore(settings, METHOD, evaluate)
     progress(f"explored {len(explored.total)} points")
     best = explored.best_parameters(settings.methods[METHOD].law)
@@ -140,9 +134,3 @@ def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> Clamped
 def _clamps(episode: Episode, band: Band, settings: Settings) -> ClampCalibration:
     sling = ClampedBand.of(band, settings.setup, settings.sling)
     return calibrate_clamps(settings, sling, episode, workers=cores())
-
-
-def _evaluator(episode: Episode, sling: ClampedBand, settings: Settings) -> Evaluator:
-    box = SearchBox.of_method(settings, METHOD)
-    loss = EpisodeLoss.of(settings, METHOD, episode, sling)
-    return Evaluator(episode, sling, loss, box, devices=devices(), workers=workers())

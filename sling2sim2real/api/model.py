@@ -13,8 +13,7 @@ from pydantic import ValidationError
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.machine import cores
 from sling2sim2real.base.schema import explained, read_json
-from sling2sim2real.identification.results.mounting import Mounting
-from sling2sim2real.identification.results.theta import ThetaFile, parameters_of
+from sling2sim2real.identification.results.theta import Mounting, ThetaFile, parameters_of
 from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import LAWS

@@ -10,11 +10,9 @@ import numpy as np
 from sling2sim2real.api.model import Model, Theta
 from sling2sim2real.api.simulation import Simulation, simulate_batch
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.machine import devices, workers
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
-from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.simulator.parameters import EXTRA
 
 
@@ -78,8 +76,7 @@ class Objective:
     def _evaluator(self, episode: Episode, method: str) -> Evaluator:
         law = self._model.settings.methods[method].law
         sling = replace(self._model.sling, law=law)
-        loss = EpisodeLoss.of(self._model.settings, method, episode, sling)
-        return Evaluator(episode, sling, loss, self._box, devices=devices(), workers=workers())
+        return Evaluator.of(self._model.settings, method, episode, sling, self._box)
 
     def __call__(self, unit: np.ndarray) -> np.ndarray:
         """Losses (N,) of points of the unit cube (N, D); +inf where a simulation fails.

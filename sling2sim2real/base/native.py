@@ -84,7 +84,7 @@ def built_once(build: Callable[..., Built]) -> Callable[..., Built]:
     return built
 
 
-def empty(size: int, dtype: Any, device: str) -> wp.array:
+def empty(size: int | tuple[int, ...], dtype: Any, device: str) -> wp.array:
     """An array for results there."""
     return wp.empty(size, dtype=dtype, device=device)
 
@@ -92,6 +92,14 @@ def empty(size: int, dtype: Any, device: str) -> wp.array:
 def run_kernel(kernel: wp.Kernel, blocks: int, inputs: list, device: str) -> None:
     """Run blocks: each is one thread of SIMD vectors on the CPU, a warp of 32 threads on CUDA."""
     threads = 32 if device.startswith("cuda") else 1
+    run_threads(kernel, blocks * threads, inputs, device, block=threads)
+
+
+def run_threads(
+    kernel: wp.Kernel, dim: int | tuple[int, ...], inputs: list, device: str, block: int = 256
+) -> None:
+    """Run a thread for each index, on CUDA `block` of them together."""
+    block = block if device.startswith("cuda") else 1
     with _one_at_a_time:  # Warp's cache has one binary for each number of threads a block
-        kernel.module.load(device, threads)
-    wp.launch(kernel, dim=blocks * threads, inputs=inputs, device=device, block_dim=threads)
+        kernel.module.load(device, block)
+    wp.launch(kernel, dim=dim, inputs=inputs, device=device, block_dim=block)

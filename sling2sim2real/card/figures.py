@@ -11,10 +11,11 @@ from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.camera_view import SIMULATED, CameraView
 from sling2sim2real.card.inputs import Aims, CardInputs
 from sling2sim2real.card.simulated import Simulated
-from sling2sim2real.card.values import SearchedRange, ShownValue
+from sling2sim2real.card.values import ShownValue
 from sling2sim2real.drawing.canvas import key, mark, picture
 from sling2sim2real.drawing.styles import INK
 from sling2sim2real.episode.episode import Episode
+from sling2sim2real.identification.results.ranges import SearchedRange
 from sling2sim2real.quantities import QUANTITIES, rounded
 
 WIDTH = 6.4  # inches: words are read on a phone too

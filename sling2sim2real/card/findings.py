@@ -8,11 +8,11 @@ import numpy as np
 from scipy.special import ndtri
 
 from sling2sim2real.card.inputs import CardInputs
-from sling2sim2real.card.values import boxes
 from sling2sim2real.card.verdict import FURTHER, Findings
 from sling2sim2real.drawing.names import as_code, as_text
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.phases import NO_UNLOADING, phases_of_hand, unseen
+from sling2sim2real.identification.results.ranges import searched
 from sling2sim2real.launching.trials.spread import LEVEL
 from sling2sim2real.quantities import QUANTITIES, rounded
 
@@ -21,7 +21,6 @@ NEARLY = 0.02  # m below the highest that the hand goes: it no longer lifts
 SLACK = 0.3  # force along over force across the horizontal, below which the band only hangs
 FEWEST = 10  # samples
 LIGHTEST = 0.05  # N: a sensor's zero is no surer
-SIDE = 0.01  # of a box's width: as near is at its side
 
 
 def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
@@ -137,19 +136,12 @@ def _odd(recordings: list[dict]) -> str:
 
 
 def _at_sides(inputs: CardInputs) -> list[tuple[str, str]]:
-    """Searched parameters at a side of their box that nature does not set: label and side."""
-    at_sides, searched = [], boxes(inputs.params, inputs.method)
+    """Searched parameters at an edge of their range: label and which edge."""
+    at_sides, ranges = [], searched(inputs.params, inputs.method)
     for name, value in inputs.theta["theta"].items():
-        if name not in searched:
-            continue
-        box = searched[name]
-        place = box.place(value)
-        sides = {"lower": place < SIDE and box.low != 0, "upper": place > 1 - SIDE}
-        quantity = QUANTITIES[name]
-        ends = " to ".join(f"{rounded(quantity.factor * x):.6g}" for x in (box.low, box.high))
-        at_sides += [
-            (quantity.label, f"{side} side of its box, {f'{ends} {quantity.unit}'.strip()}")
-            for side, there in sides.items()
-            if there
-        ]
+        if name in ranges and (side := ranges[name].edge(value)):
+            quantity, box = QUANTITIES[name], ranges[name]
+            low, high = (f"{rounded(quantity.factor * x):.6g}" for x in (box.low, box.high))
+            words = f"{side} side of its box, {low} to {high} {quantity.unit}".strip()
+            at_sides.append((quantity.label, words))
     return at_sides

@@ -87,7 +87,7 @@ def _gains(
     if not unloaded and DIP[0] in model.names:
         yield Gain(
             f"{A_DIP}: {{before}} {{at}} become about {{after}}.",
-            model.after(model.explained(*DIP))[aim],
+            model.after(model.known(DIP[0], spread=DIP[1]))[aim],
         )
     yield Gain(
         "Record another pull like those that you have: {before} {at} become about {after}.",
@@ -96,13 +96,13 @@ def _gains(
     yield Gain(
         "Take more pictures of the recoil, by a faster camera or by pulls that are seen at other"
         " moments: with damping and drag known exactly, {before} {at} become {after}.",
-        model.after(model.exact(RECOIL))[aim],
+        model.after(model.known(*RECOIL))[aim],
     )
     if any(map(relaxing, episodes)):
         yield Gain(
             "Pause longer before the release, for the force was still falling: with stiffness and"
             " relaxation known exactly, {before} {at} become {after}.",
-            model.after(model.exact(PULL))[aim],
+            model.after(model.known(*PULL))[aim],
         )
     yield Gain(
         "Draw more exactly: by an arm without error, {before} {at} become {after}.",

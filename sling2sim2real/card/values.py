@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
-import numpy as np
-
-from sling2sim2real.base.parameters import parameters
 from sling2sim2real.quantities import QUANTITIES, rounded
-from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.parameters import EXTRA
 
 
@@ -60,33 +55,3 @@ def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
         cells = quantity.label, quantity.unit, value, low, high, still, prior, identified
         shown_values.append(ShownValue(name, *cells))
     return shown_values
-
-
-class SearchedRange(NamedTuple):
-    """Within which a method searches a parameter [SI]; `scale` is linear or log."""
-
-    low: float
-    high: float
-    scale: str = "linear"
-
-    def place(self, value: float) -> float:
-        """Place of a value in the range, from 0 at the lower end to 1 at the upper one."""
-        ends = np.array([value, self.low, self.high], float)
-        if self.scale == "log":
-            ends = np.log(ends)
-        return float((ends[0] - ends[1]) / (ends[2] - ends[1]))
-
-
-def boxes(params: Settings, method: str) -> dict[str, SearchedRange]:
-    """Ranges of what a method searches, by name."""
-    config = params.methods[method]
-    ranges = {name: SearchedRange(box.low, box.high, box.scale) for name, box in params.parameters}
-    ranges |= {name: SearchedRange(*ends) for name, ends in config.bounds.items()}
-    for row in parameters(config.law):
-        if row.coordinate and row.coordinate.bounds:
-            low, high = row.coordinate.bounds
-            if row.coordinate.log:
-                low, high = float(np.exp(low)), float(np.exp(high))
-            scale = "log" if row.coordinate.log else "linear"
-            ranges[row.name] = SearchedRange(low, high, scale)
-    return {name: box for name, box in ranges.items() if name not in config.fixed}

@@ -15,8 +15,8 @@ from sling2sim2real.card.conclusion import Conclusion
 from sling2sim2real.card.inputs import CardInputs
 from sling2sim2real.card.simulated import simulate
 from sling2sim2real.card.text import card_text
-from sling2sim2real.card.values import boxes
 from sling2sim2real.drawing.page import page
+from sling2sim2real.identification.results.ranges import searched
 
 SIZES = "mass", "diameter", "rest_length"  # kg, m, m
 
@@ -38,7 +38,7 @@ def write(to: Path, inputs: CardInputs, pictures: Pictures, digest: str | None =
     with replacing_folder(to) as folder:
         figures.camera(folder / "camera.webp", episode, simulated, pictures)
         figures.force(folder / "force.png", episode, simulated)
-        figures.values(folder / "values.png", concluded.values, boxes(params, inputs.method))
+        figures.values(folder / "values.png", concluded.values, searched(params, inputs.method))
         figures.landings(folder / "landings.png", inputs)
         animate(folder / "animation.webp", episode, simulated, pictures, params.setup.fork_width)
         write_text(folder / "README.md", card_text(inputs, concluded))

@@ -8,7 +8,7 @@ import numpy as np
 
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.planned import planned_pull
-from sling2sim2real.identification.results.mounting import Mounting
+from sling2sim2real.identification.results.theta import Mounting
 from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.initial import hanging_guess
 from sling2sim2real.simulator.launch import Launches

@@ -17,7 +17,7 @@ import numpy as np
 from sling2sim2real.base.errors import UserError, one_line
 from sling2sim2real.base.imported import imported
 from sling2sim2real.identification.objective.box import SearchBox, latin_hypercube
-from sling2sim2real.identification.objective.evaluate import Evaluation, Penalty
+from sling2sim2real.identification.objective.evaluate import Evaluation
 from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import POSTERIOR
@@ -66,20 +66,22 @@ def run(
     Raises:
         UserError: The search asked for something else than points of the unit cube.
     """
-    penalty, left, generation = Penalty(), rollouts, 0
+    remaining, generation, worst = rollouts, 0, 0.0
 
     def losses_of(unit: np.ndarray, solver: np.ndarray | None = None) -> np.ndarray:
-        nonlocal left, generation
-        chosen = _checked(unit, len(box.free), phase)[:left]
-        if not left:
+        nonlocal remaining, generation, worst
+        chosen = _checked(unit, len(box.free), phase)[:remaining]
+        if not remaining:
             raise BudgetSpent
         evaluation = evaluate(box.fill(chosen))
-        number = None if solver is None else np.asarray(solver, np.int32)[:left]
+        number = None if solver is None else np.asarray(solver, np.int32)[:remaining]
         evaluations.add(evaluation, phase=phase, generation=generation, solver=number)
-        left, generation = left - len(chosen), generation + 1
-        if not left:
+        remaining, generation = remaining - len(chosen), generation + 1
+        if not remaining:
             raise BudgetSpent
-        return penalty(evaluation.total)
+        finite = np.isfinite(evaluation.total)
+        worst = max([worst, *evaluation.total[finite]])
+        return np.where(finite, evaluation.total, 2 * worst if worst else 1e6)
 
     try:
         search(losses_of)

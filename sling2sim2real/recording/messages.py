@@ -1,7 +1,7 @@
 """Messages: by their schema to attributes, and by their type to what the pipeline takes from them.
 
 ROS 2, ROS 1, Foxglove and Franka schemas differ in the names of fields and in where the stamp is;
-here they become `Reading`s. `READERS` is the one table of types: what is not in it is not kept.
+here they become `Reading`s. `TYPES` is the one table of types: what is not in it is not read.
 
 Recorders that do not find the definitions write empty schemas, or names alone: standard types of
 ROS 2 are known by name.
@@ -16,13 +16,12 @@ import base64
 import json
 import os
 import re
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import lru_cache
-from itertools import islice
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 from tempfile import TemporaryFile
 from types import SimpleNamespace
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 import zstandard
@@ -32,170 +31,163 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from rosbags.typesys.store import Typestore
 from scipy.spatial.transform import Rotation
 
-from sling2sim2real.base.errors import UserError, printable
+from sling2sim2real.base.errors import printable
 from sling2sim2real.recording.camera import Calibration, Camera
 
-HELD = 2**29  # bytes of raw messages that are held in memory: the others lie in a temporary file
-TRIES = 9  # messages that are looked at to know a topic
-
-MOST_BYTES = 2**25  # of one message: a raw 4K picture has less, JSON takes fifty times as much
+LONGEST = 2**25  # bytes of a message that was packed: a raw 4K picture has less
 LATEST = 2**62  # ns; a stamp beyond it is damage
-MOVES = 0.3  # of the largest movement: joints that move less are no fingers, or another hand's
-ALIKE = 0.9  # correlation of fingers that move as one
 FRANKA_BASE = "franka_base"  # frame of Franka states whose header names none, as franka_ros writes
 PACKED = b"\x28\xb5\x2f\xfd"  # of zstd; no header of CDR begins so
 XCDR2 = range(0x06, 0x0C)  # second byte: OMG DDS-XTypes 1.3, table 60
 PACKAGES = ("geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "tf2_msgs")
-# What readers raise where fields are missing, of other types or beyond all bounds.
-UNFIT = (AttributeError, LookupError, TypeError, ValueError, OverflowError)
 
 Message = Any  # it has the attributes that its schema says, and whoever reads it finds out
 Decoder = Callable[[bytes], Message]
-Value = TypeVar("Value")
 Edge = tuple[str, str]  # parent and child frame
 NO_SCHEMA = Schema(id=0, data=b"", encoding="", name="")
 
 
 class Spool:
-    """Where raw messages are kept: in memory as long as they are few, then in a temporary file."""
+    """A temporary file of pictures' bytes: memory holds none of them."""
 
-    def __init__(self, held: int = HELD) -> None:
-        self.room, self.size = held, 0
-        self.file: Any = None
+    def __init__(self) -> None:
+        self._file = TemporaryFile(buffering=0)  # noqa: SIM115 (it ends with the last picture)
+        self._size = 0
 
-    def put(self, data: bytes) -> bytes | tuple[int, int]:
-        """Keep a message; what `get` needs to find it."""
-        self.room -= len(data)
-        if self.room >= 0:
-            return data
-        self.file = self.file or TemporaryFile()  # noqa: SIM115 (it ends with the last message)
-        place = self.size, len(data)
-        self.file.write(data)
-        self.size += len(data)
-        return place
+    def put(self, data: np.ndarray) -> Callable[[], np.ndarray]:
+        """Keep some bytes; what gives them back."""
+        place, self._size = self._size, self._size + len(data)
+        self._file.write(data.data)
+        return partial(self._get, place, len(data))
 
-    def get(self, place: bytes | tuple[int, int]) -> bytes:
-        if isinstance(place, bytes):
-            return place
-        self.file.flush()
-        return os.pread(self.file.fileno(), place[1], place[0])
+    def _get(self, place: int, size: int) -> np.ndarray:
+        return np.frombuffer(os.pread(self._file.fileno(), size, place), np.uint8)
 
 
-class Payloads(Sequence[bytes]):
-    """Raw messages of one topic, in the order of the file."""
-
-    def __init__(self, spool: Spool) -> None:
-        self._spool = spool
-        self._places: list[bytes | tuple[int, int]] = []
-
-    def append(self, data: bytes) -> None:
-        self._places.append(self._spool.put(data))
-
-    def extend(self, others: Payloads) -> None:
-        """Of the same spool."""
-        self._places += others._places
-
-    def __len__(self) -> int:
-        return len(self._places)
-
-    def __getitem__(self, number: Any) -> Any:
-        return self._spool.get(self._places[number])
-
-
-@dataclass
-class Channel:
-    """One topic with its raw messages, in the order of the file; those of no use are left empty."""
-
-    topic: str
-    schema: Schema
-    encoding: str
-    log_times: list[int] = field(default_factory=list)  # ns
-    payloads: Any = field(default_factory=list)
-
-
-class Unreadable(Exception):
-    """A message that cannot be read; it says why, in one line."""
+class Unreadable(str):
+    """Why a message cannot be read, in one line."""
 
     @classmethod
     def by(cls, error: Exception) -> Unreadable:
         return cls(str(error).partition("\n")[0] or type(error).__name__)
 
 
-class Elsewhere(Unreadable):
-    """A message of another publisher on the same topic."""
+@dataclass
+class Topic:
+    """One topic with what its messages say, in the order of the file.
+
+    Attributes:
+        name: Of the topic.
+        log_times: Of all its messages [ns].
+        readings: By what they show (`TYPES`) a reading of each message, or why there is none.
+        problem: Why no message can be read, "" where some may.
+    """
+
+    name: str
+    schema: Schema
+    encoding: str
+    log_times: list[int] = field(default_factory=list)
+    readings: dict[str, list[Reading | Unreadable]] = field(default_factory=dict)
+    problem: str = ""
+    decode: Decoder | None = None
+    spool: Spool | None = None
+
+    @classmethod
+    def of(cls, name: str, schema: Schema, encoding: str, spool: Spool | None = None) -> Topic:
+        """One without messages; pictures stay in memory without a spool."""
+        topic = cls(name, replace(schema, name=printable(schema.name)), encoding, spool=spool)
+        topic.readings = {what: [] for what in TYPES.get(topic.kind, {})}
+        if topic.readings:
+            try:
+                topic.decode = decoder(schema, encoding)
+            except Exception as error:  # the parsers raise many kinds
+                topic.problem = f"topic {name}: {Unreadable.by(error)}"
+        return topic
+
+    @property
+    def kind(self) -> str:
+        """The type's own name: geometry_msgs/msg/PoseStamped, a.b.PoseStamped -> PoseStamped."""
+        kind = re.split(r"[/.:]+", self.schema.name)[-1].removesuffix("_")  # which DDS adds
+        return "WrenchStamped" if kind.endswith("WrenchStamped") else kind
+
+    def add(self, log_time: int, payload: bytes) -> None:
+        """Read the next message."""
+        self.log_times.append(log_time)
+        if self.decode is None:
+            return
+        message = _tried(self.decode, payload)
+        for what, read in TYPES[self.kind].items():
+            reading = message if isinstance(message, Unreadable) else _tried(read, message)
+            if self.spool and isinstance(reading, Reading) and isinstance(reading.value, Picture):
+                stored = replace(reading.value, content=self.spool.put(reading.value.data))
+                reading = reading._replace(value=stored)
+            self.readings[what].append(reading)
 
 
-def decoder(channel: Channel) -> Decoder:
-    """A function from payload to a message with attributes; it raises Unreadable.
+def _tried(make: Callable[[Any], Any], given: Any) -> Any:
+    """What is made, or why it cannot be: damaged bytes make the libraries raise anything."""
+    try:
+        return make(given)
+    except OSError:
+        raise
+    except Exception as error:
+        return Unreadable.by(error)
+
+
+def decoder(schema: Schema, encoding: str) -> Decoder:
+    """A function from payload to a message with attributes; it raises anything.
 
     Raises:
-        UserError: where the encoding is not known or the schema is bad, in one line.
+        ValueError: where the encoding is not known or the schema is bad, in one line.
     """
-    schema = channel.schema
-    by_name = channel.encoding == "cdr" and _says_nothing(schema)
-    if not by_name and (schema.encoding, channel.encoding) not in DECODERS:
+    by_name = encoding == "cdr" and _says_nothing(schema)
+    if not by_name and (schema.encoding, encoding) not in DECODERS:
         supported = ", ".join(f"{a} with {b}" for a, b in DECODERS)
         what = f"schema {schema.encoding!r}" if schema.encoding else "no schema"
-        raise UserError(
-            f"topic {channel.topic}: {what} with messages {channel.encoding!r} cannot be read,"
-            f" record one of: {supported}"
+        raise ValueError(
+            f"{what} with messages {encoding!r} cannot be read, record one of: {supported}"
         )
     try:
         if by_name:
-            read = _standard(schema.name)
+            read = partial(_store().deserialize_cdr, typename=_standard_name(schema.name))
         else:
-            read = _compiled(schema.encoding, channel.encoding, schema.name, schema.data)
+            read = _compiled(schema.encoding, encoding, schema.name, schema.data)
     except Exception as error:  # the parsers raise many kinds
-        reason = Unreadable.by(error)
-        raise UserError(f"topic {channel.topic}: bad schema {schema.name} ({reason})") from error
-
-    def bounded(payload: bytes) -> Message:
-        if len(payload) > MOST_BYTES:
-            raise Unreadable("a message that is too long")
-        try:
-            return read(_plain(payload, MOST_BYTES) if channel.encoding == "cdr" else payload)
-        except Exception as error:  # damaged bytes make the libraries raise anything
-            raise Unreadable.by(error) from error
-
-    return bounded
+        raise ValueError(f"bad schema {schema.name} ({Unreadable.by(error)})") from error
+    return (lambda payload: read(_plain(payload))) if encoding == "cdr" else read
 
 
 def _says_nothing(schema: Schema) -> bool:
     """Whether a schema is no more than the name of a standard type of ROS 2."""
-    if not _is_standard(schema.name):
+    name = _standard_name(schema.name)
+    if not name.startswith(PACKAGES) or name not in _store().fielddefs:
         return False
     if schema.encoding in ("", "omgidl"):  # of DDS, whose names of ROS types are as well known
         return True
     return schema.encoding == "ros2msg" and schema.data.strip() in (b"", schema.name.encode())
 
 
-def readable(
-    read: Callable[[bytes], Value], payloads: Iterable[bytes], most: int | None = TRIES
-) -> tuple[list[Value], str]:
-    """What the first messages say that can be read, and why the last of the others cannot be."""
-    reasons = ["all are damaged"]
-
-    def readings() -> Iterator[Value]:
-        for payload in payloads:
-            try:
-                yield read(payload)
-            except Unreadable as error:
-                reasons.append(str(error))
-
-    return list(islice(readings(), most)), reasons[-1]
+def _standard_name(schema: str) -> str:
+    """a::msg::dds_::B_, as DDS has it, and a/B to a/msg/B."""
+    package, kind = re.split("::|/", schema)[0], re.split("::|/", schema)[-1]
+    return f"{package}/msg/{kind.removesuffix('_') if '::' in schema else kind}"
 
 
-def message_reader(decode: Decoder, read: Callable[[Message], Value]) -> Callable[[bytes], Value]:
-    """Make a function from payload to what `read` takes of its message; it raises Unreadable."""
+def _plain(payload: bytes) -> bytes:
+    """Return a message's CDR, unpacked where zstd packed it. Raises ValueError of XCDR2."""
+    if payload[:4] == PACKED:  # ros2 bag record --compression-mode message
+        with zstandard.ZstdDecompressor().stream_reader(payload) as stream:
+            payload = stream.read(LONGEST)
+    if len(payload) > 1 and not payload[0] and payload[1] in XCDR2:
+        raise ValueError(
+            "in XCDR2, record with a middleware that writes XCDR1, the default of ROS 2"
+        )
+    return payload
 
-    def decoded(payload: bytes) -> Value:
-        message = decode(payload)
-        try:
-            return read(message)
-        except UNFIT as error:
-            raise Unreadable.by(error) from error
 
-    return decoded
+@lru_cache(1)
+def _store() -> Typestore:
+    return get_typestore(Stores.ROS2_HUMBLE)
 
 
 @lru_cache(64)
@@ -243,47 +235,6 @@ DECODERS: dict[tuple[str, str], Callable[[Schema], Decoder]] = {
 }
 
 
-def _standard_name(schema: str) -> str:
-    """a::msg::dds_::B_, as DDS has it, and a/B to a/msg/B."""
-    package, kind = re.split("::|/", schema)[0], re.split("::|/", schema)[-1]
-    return f"{package}/msg/{kind.removesuffix('_') if '::' in schema else kind}"
-
-
-def _is_standard(schema: str) -> bool:
-    """Whether it is the name of a standard type."""
-    name = _standard_name(schema)
-    return name.startswith(PACKAGES) and name in _store().fielddefs
-
-
-def _standard(schema: str) -> Callable[[bytes], Any]:
-    """Make a function from payload to message, of a standard type."""
-    store, name = _store(), _standard_name(schema)
-    return lambda payload: store.deserialize_cdr(payload, name)
-
-
-def _plain(payload: bytes, most: int) -> bytes:
-    """Return a message's CDR, unpacked where zstd packed it.
-
-    Raises ValueError where it is XCDR2, or unpacks to more than `most` bytes. The length of what
-    is not packed is not checked.
-    """
-    if payload[:4] == PACKED:  # ros2 bag record --compression-mode message
-        with zstandard.ZstdDecompressor().stream_reader(payload) as stream:
-            payload = stream.read(most + 1)
-        if len(payload) > most:
-            raise ValueError("a message that is too long")
-    if len(payload) > 1 and not payload[0] and payload[1] in XCDR2:
-        raise ValueError(
-            "in XCDR2, record with a middleware that writes XCDR1, the default of ROS 2"
-        )
-    return payload
-
-
-@lru_cache(1)
-def _store() -> Typestore:
-    return get_typestore(Stores.ROS2_HUMBLE)
-
-
 @dataclass(frozen=True)
 class Picture:
     """What all image messages have in common.
@@ -291,7 +242,7 @@ class Picture:
     Attributes:
         encoding: Of raw pixels (rgb8, 16UC1, ...), "" where `data` is packed.
         format: Of packed data ("jpeg", "16UC1; compressedDepth png", ...), "" where it is raw.
-        data: uint8, shape (bytes,).
+        content: uint8, shape (bytes,), or what gives it.
         height, width: Pixels; 0 where packed, as are `step` and `is_bigendian`.
         step: Bytes a row, with its padding.
         stamp: Of its header, as it was recorded [ns].
@@ -299,12 +250,17 @@ class Picture:
 
     encoding: str
     format: str
-    data: np.ndarray
+    content: np.ndarray | Callable[[], np.ndarray]
     height: int = 0
     width: int = 0
     step: int = 0
     is_bigendian: bool = False
     stamp: int = 0
+
+    @property
+    def data(self) -> np.ndarray:
+        """The bytes, uint8."""
+        return self.content() if callable(self.content) else self.content
 
     @property
     def kind(self) -> tuple[Hashable, ...]:
@@ -313,24 +269,18 @@ class Picture:
 
 
 class Reading(NamedTuple):
-    """One message.
+    """What a message says.
 
     Attributes:
         stamp: Of its header [ns]; None where the type has none.
         frame: frame_id, "" where there is none.
-        value: wrench fx fy fz [N]; pose x y z [m] qx qy qz qw; gripper and joints: positions
-            [rad, m]; a Picture; a Calibration.
+        value: wrench fx fy fz [N]; pose x y z [m] qx qy qz qw; positions of joints [rad, m], by
+            name; a Picture; a Calibration; transforms, a pose for each (parent, child).
     """
 
     stamp: int | None
     frame: str
     value: Any
-
-
-def kind_of(schema: str) -> str:
-    """The schema's own name: geometry_msgs/msg/PoseStamped, a.b.PoseStamped -> PoseStamped."""
-    kind = re.split(r"[/.:]+", schema)[-1].removesuffix("_")  # which DDS adds
-    return "WrenchStamped" if kind.endswith("WrenchStamped") else kind
 
 
 def first_of(message: Message, *names: str) -> Message:
@@ -362,13 +312,21 @@ def frame_of(message: Message) -> str:
     return printable(str(getattr(header, "frame_id", ""))).lstrip("/")
 
 
+def _reading(message: Message, value: Any) -> Reading:
+    return Reading(stamp_of(message), frame_of(message), value)
+
+
 def read_wrench(message: Message) -> Reading:
     return _reading(message, _vector(getattr(message, "wrench", message).force))
 
 
 def read_pose(message: Message) -> Reading:
-    pose = getattr(message.pose, "pose", message.pose)  # PoseWithCovariance
-    return _reading(message, pose_of(pose))
+    """PoseStamped and PoseInFrame; of PosesInFrame one of one pose, otherwise ValueError."""
+    if hasattr(message, "poses"):
+        (pose,) = message.poses
+    else:
+        pose = getattr(message.pose, "pose", message.pose)  # PoseWithCovariance
+    return _reading(message, _pose(pose.position, pose.orientation))
 
 
 def read_state_pose(message: Message) -> Reading:
@@ -376,7 +334,8 @@ def read_state_pose(message: Message) -> Reading:
     pose = first_of(message, "o_t_ee", "O_T_EE")
     if hasattr(pose, "pose"):
         frame = frame_of(pose) or frame_of(message) or FRANKA_BASE
-        return Reading(stamp_of(message), frame, pose_of(pose.pose))
+        value = _pose(pose.pose.position, pose.pose.orientation)
+        return Reading(stamp_of(message), frame, value)
     matrix = np.array(pose, float).reshape(4, 4).T
     if not np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-3):
         raise ValueError("O_T_EE has no rotation")
@@ -395,47 +354,14 @@ def read_state_wrench(message: Message) -> Reading:
     return Reading(stamp_of(message), frame, _vector(wrench.wrench.force))
 
 
-def fingers_reader(names: tuple[str, ...]) -> Callable[[Message], Reading]:
-    """Positions of these joints: two fingers that each move half the opening, or one value."""
-    read = joints_reader(names, "")
-    return lambda message: read(message)._replace(frame=frame_of(message))
-
-
-def opening_of(values: np.ndarray, topic: str, names: tuple[str, ...]) -> np.ndarray:
-    """Opening of a hand, shape (S, 1), from the positions of its fingers (S, C).
-
-    Fingers of a mirrored sign count the other way round, those that hardly move not at all. Raises
-    UserError where the others do not move as one, as those of two hands.
-    """
-    moved = np.ptp(values, axis=0)
-    counts = moved >= MOVES * moved.max()
-    fingers = values[:, counts]
-    if moved.max() == 0:
-        return fingers.sum(axis=1, keepdims=True)
-    likeness = np.corrcoef(fingers.T, values[:, np.argmax(moved)])[-1, :-1]
-    if np.abs(likeness).min() < ALIKE:
-        moving = ", ".join(name for name, counted in zip(names, counts, strict=True) if counted)
-        raise UserError(f"{topic}: the joints {moving} do not move as the fingers of one hand")
-    return (fingers * np.sign(likeness)).sum(axis=1, keepdims=True)
-
-
-def joints_reader(names: tuple[str, ...], frame: str) -> Callable[[Message], Reading]:
-    """Positions of these joints, in this order, of a robot whose root is `frame`.
-
-    The reader raises ValueError for a message in which one is missing, Elsewhere for one in which
-    all are: other devices may share the topic.
-    """
-
-    def read(message: Message) -> Reading:
-        joints = joints_of(message)
-        missing = [name for name in names if name not in joints]
-        if missing and len(missing) == len(names):
-            raise Elsewhere(f"joint {missing[0]} is missing")
-        if missing:
-            raise ValueError(f"joint {missing[0]} is missing")
-        return Reading(stamp_of(message), frame, tuple(joints[name] for name in names))
-
-    return read
+def read_joints(message: Message) -> Reading:
+    """JointState and foxglove.JointStates."""
+    if hasattr(message, "joints"):
+        joints = {str(joint.name): float(joint.position) for joint in message.joints}
+    else:
+        names, positions = map(str, message.name), map(float, message.position)
+        joints = dict(zip(names, positions, strict=True))
+    return _reading(message, joints)
 
 
 def read_image(message: Message) -> Reading:
@@ -449,12 +375,6 @@ def read_image(message: Message) -> Reading:
     return _reading(message, Picture(str(message.encoding), "", data, *size, swapped, stamp))
 
 
-def read_poses(message: Message) -> Reading:
-    """foxglove.PosesInFrame of one pose. Raises ValueError of several."""
-    (pose,) = message.poses
-    return _reading(message, pose_of(pose))
-
-
 def read_calibration(message: Message) -> Reading:
     """CameraInfo of ROS 2 (k, d, p) and ROS 1, foxglove.CameraCalibration (K, D, P)."""
     matrix = np.array(first_of(message, "k", "K"), float).reshape(3, 3)
@@ -463,38 +383,34 @@ def read_calibration(message: Message) -> Reading:
     distortion = np.array(first_of(message, "d", "D"), float).ravel()
     frame = frame_of(message)
     camera = Camera(int(message.width), int(message.height), matrix, distortion, frame)
-    across, down = (max(1, int(getattr(message, f"binning_{axis}", 1))) for axis in "xy")
-    roi = getattr(message, "roi", None)
-    sides = (roi.x_offset, roi.y_offset, roi.width, roi.height) if roi else (0, 0, 0, 0)
-    x, y, width, height = map(int, sides)
-    model = str(message.distortion_model)
-    value = Calibration(camera, model, rectified, (across, down), (x, y, width, height))
-    return Reading(stamp_of(message), frame, value)
+    value = Calibration(camera, str(message.distortion_model), rectified)
+    return _reading(message, value)
 
 
-def joints_of(message: Message) -> dict[str, float]:
-    """Position of each joint, of JointState, foxglove.JointStates or a Franka state."""
-    message = getattr(message, "measured_joint_state", message)
-    if hasattr(message, "joints"):
-        return {str(joint.name): float(joint.position) for joint in message.joints}
-    return dict(zip(map(str, message.name), map(float, message.position), strict=True))
+def read_transforms(message: Message) -> Reading:
+    """TFMessage, FrameTransform and FrameTransforms."""
+    some = getattr(message, "transforms", [message])
+    edges: dict[Edge, np.ndarray] = {}
+    for stamped in some:
+        if hasattr(stamped, "transform"):
+            parent, pose = stamped.header.frame_id, stamped.transform
+        else:
+            parent, pose = stamped.parent_frame_id, stamped
+        try:
+            numbers = np.array(_pose(pose.translation, pose.rotation))
+        except ValueError:  # some publishers leave the quaternion at zero
+            continue
+        if np.isfinite(numbers).all():
+            edges[printable(str(parent)), printable(str(stamped.child_frame_id))] = numbers
+    return Reading(stamp_of(some[0]) if len(some) else None, "", edges)
 
 
-def pose_of(pose: Message) -> tuple[float, ...]:
-    """x y z qx qy qz qw of a Pose."""
-    return (*_vector(pose.position), *quaternion_of(pose.orientation))
-
-
-def quaternion_of(turn: Message) -> tuple[float, ...]:
-    """x y z w. Raises ValueError where it has no length."""
+def _pose(place: Message, turn: Message) -> tuple[float, ...]:
+    """x y z qx qy qz qw. Raises ValueError where the quaternion has no length."""
     quaternion = tuple(float(getattr(turn, axis)) for axis in "xyzw")
     if not sum(x * x for x in quaternion) > 1e-12:
         raise ValueError("the quaternion has no length")
-    return quaternion
-
-
-def _reading(message: Message, value: tuple[float, ...] | Picture) -> Reading:
-    return Reading(stamp_of(message), frame_of(message), value)
+    return *_vector(place), *quaternion
 
 
 def _vector(vector: Message) -> tuple[float, float, float]:
@@ -510,56 +426,25 @@ def _bytes(data: Message) -> np.ndarray:
     return np.asarray(data, np.uint8)
 
 
-def edges_of(message: Message) -> list[tuple[Edge, np.ndarray]]:
-    """Parent and child, and pose of the child in the parent: x y z qx qy qz qw."""
-    edges = []
-    for stamped in getattr(message, "transforms", [message]):
-        if hasattr(stamped, "transform"):
-            edge, pose = (stamped.header.frame_id, stamped.child_frame_id), stamped.transform
-        else:
-            edge, pose = (stamped.parent_frame_id, stamped.child_frame_id), stamped
-        place = pose.translation
-        try:
-            numbers = np.array([place.x, place.y, place.z, *quaternion_of(pose.rotation)], float)
-        except ValueError:  # some publishers leave the quaternion at zero
-            continue
-        if np.isfinite(numbers).all():
-            edges.append((tuple(printable(str(name)) for name in edge), numbers))
-    return edges
-
-
-def is_read(schema: str) -> bool:
-    """Whether messages of a type are of use, by its schema's name; one without a name may be."""
-    return not schema or any(kind_of(schema) in kinds for kinds in (TRANSFORMS, *READERS.values()))
-
-
 Read = Callable[[Message], Reading]
-# How each type is read for each role, the best types first; None where it depends on the
-# recording and on params (`topics`).
-JOINTS: dict[str, Read | None] = dict.fromkeys(("JointState", "JointStates"))
-TRANSFORMS = ("TFMessage", "FrameTransform", "FrameTransforms")
-IMAGES: dict[str, Read | None] = dict.fromkeys(("Image", "RawImage", "CompressedImage"), read_image)
-INFO: dict[str, Read | None] = dict.fromkeys(("CameraInfo", "CameraCalibration"), read_calibration)
-READERS: dict[str, Mapping[str, Read | None]] = {
-    "wrench": {
-        "WrenchStamped": read_wrench,
-        "FrankaRobotState": read_state_wrench,
-        "FrankaState": read_state_wrench,
-    },
-    "pose": {
-        "PoseStamped": read_pose,
-        "PoseInFrame": read_pose,
-        "PoseWithCovarianceStamped": read_pose,
-        "FrankaRobotState": read_state_pose,
-        "FrankaState": read_state_pose,
-        **JOINTS,
-        "Odometry": read_pose,
-        "PosesInFrame": read_poses,
-        **dict.fromkeys(TRANSFORMS),
-    },
-    "gripper": JOINTS,
-    "color": IMAGES,
-    "depth": IMAGES,
-    "color_info": INFO,
-    "depth_info": INFO,
+# What each type shows, and how it is read; the best types first.
+TYPES: dict[str, dict[str, Read]] = {
+    "WrenchStamped": {"wrench": read_wrench},
+    "PoseStamped": {"pose": read_pose},
+    "PoseInFrame": {"pose": read_pose},
+    "PoseWithCovarianceStamped": {"pose": read_pose},
+    "FrankaRobotState": {"pose": read_state_pose, "wrench": read_state_wrench},
+    "FrankaState": {"pose": read_state_pose, "wrench": read_state_wrench},
+    "JointState": {"joints": read_joints},
+    "JointStates": {"joints": read_joints},
+    "Odometry": {"pose": read_pose},
+    "PosesInFrame": {"pose": read_pose},
+    "TFMessage": {"transforms": read_transforms},
+    "FrameTransform": {"transforms": read_transforms},
+    "FrameTransforms": {"transforms": read_transforms},
+    "Image": {"picture": read_image},
+    "RawImage": {"picture": read_image},
+    "CompressedImage": {"picture": read_image},
+    "CameraInfo": {"info": read_calibration},
+    "CameraCalibration": {"info": read_calibration},
 }

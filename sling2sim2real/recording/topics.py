@@ -10,8 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import chain, islice
+from functools import cached_property, partial
 from os.path import commonprefix
 
 import numpy as np
@@ -21,75 +20,64 @@ from sling2sim2real.recording import images
 from sling2sim2real.recording.camera import Camera, camera_from
 from sling2sim2real.recording.files import Container
 from sling2sim2real.recording.kinematics import chain_of
-from sling2sim2real.recording.messages import (
-    READERS,
-    TRANSFORMS,
-    TRIES,
-    Channel,
-    Decoder,
-    Edge,
-    Elsewhere,
-    Message,
-    Read,
-    Reading,
-    Unreadable,
-    decoder,
-    edges_of,
-    fingers_reader,
-    joints_of,
-    joints_reader,
-    kind_of,
-    message_reader,
-    opening_of,
-    readable,
-    stamp_of,
-)
+from sling2sim2real.recording.messages import TYPES, Edge, Reading, Topic, Unreadable
 from sling2sim2real.recording.transforms import Transform, TransformTree
 from sling2sim2real.recording.words import few
 from sling2sim2real.settings.lab import SetupParams
 
-JOINT_TRIES = 50  # of joints: some share their topic with other publishers
-JOINTS_SHOWN = 12  # joints named in a message
+TRIES = 9  # messages that are looked at to know a topic
+JOINT_TRIES = 50  # of joints and transforms: some share their topic with other publishers
+SHOWN = 12  # topics or joints named in a message
 FINGERS = ("finger", "gripper", "knuckle")
+MOVES = 0.3  # of the largest movement: joints that move less are no fingers, or another hand's
+ALIKE = 0.9  # correlation of fingers that move as one
 OPTIONAL = ("gripper",)
 COMMANDS = ("goal", "desired", "command", "commanded", "cmd", "target", "reference", "setpoint")
 THINGS = ("camera", "object", "tag", "marker")
-
-STATES = ("FrankaRobotState", "FrankaState")
-SHOWN = 12  # topics named in a message
 COLOUR = {"color": "colour", "depth": "depth"}
 VIDEO = ("FFMPEGPacket", "CompressedVideo")
-TOOLS = ("tcp", "ee", "end_effector")  # words in the name of the frame that a pose is given for
+TOOLS = {"tcp", "ee", "end_effector"}  # words in the name of the frame that a pose is given for
 STILL = 1e-9  # m and quaternion: a transform that changes by more is no static one
 
 Convert = Callable[[np.ndarray], np.ndarray]
-Source = tuple[Read, Convert | None]
+Messages = Sequence[tuple[int, Reading | Unreadable]]
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A channel, how to read it, and why it was chosen.
+    """A topic, what it says, and why it was chosen.
 
     Attributes:
-        channel: Raw payloads.
-        read: Payload to reading; raises Unreadable.
+        topic: The whole of it.
+        messages: log_time of each [ns], and its reading or why it cannot be read.
         why: One phrase.
         convert: All values, shape (S, C), to what the role asks for, shape (S, 7) or (S, 1); None
             where the values are that already. Raises UserError.
     """
 
-    channel: Channel
-    read: Callable[[bytes], Reading]
+    topic: Topic
+    messages: Messages
     why: str = ""
     convert: Convert | None = None
 
+    @property
+    def name(self) -> str:
+        return self.topic.name
+
+    @property
+    def readings(self) -> list[Reading]:
+        """Those of its messages that can be read."""
+        return [reading for _, reading in self.messages if isinstance(reading, Reading)]
+
+    @cached_property
     def typical(self) -> Reading:
         """The first message of the frame and kind that most have. Raises UserError."""
-        messages, reason = readable(self.read, self.channel.payloads)
-        if not messages:
-            raise UserError(f"{self.channel.topic} has fewer than two readable messages ({reason})")
-        kinds = [(message.frame, getattr(message.value, "kind", None)) for message in messages]
-        return messages[kinds.index(Counter(kinds).most_common(1)[0][0])]
+        some = self.readings[:TRIES]
+        if not some:
+            reason = next((why for _, why in self.messages[::-1]), "all are damaged")
+            raise UserError(f"{self.name} has fewer than two readable messages ({reason})")
+        kinds = [(reading.frame, getattr(reading.value, "kind", None)) for reading in some]
+        return some[kinds.index(Counter(kinds).most_common(1)[0][0])]
 
 
 @dataclass(frozen=True)
@@ -98,241 +86,97 @@ class Role:
 
     Attributes:
         what: It, in messages.
+        shows: What its messages must show (`TYPES`), one of these.
         rate: Below it, a topic of the right type is not likely to be it [Hz].
         spare: Types that serve only where there is no other.
     """
 
     what: str
+    shows: tuple[str, ...]
     hints: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     rate: float = 0.0
     spare: tuple[str, ...] = ()
+
+    @property
+    def types(self) -> list[str]:
+        """The best first."""
+        return [kind for kind, shows in TYPES.items() if {*shows} & {*self.shows}]
 
 
 CAMERAS = ("color", "depth")  # roles of pictures
 ROLES = {
     "wrench": Role(
         "force (a geometry_msgs/WrenchStamped topic)",
+        ("wrench",),
         hints=("ft", "force", "wrench"),
         doubts=(*COMMANDS, "estimated", "external", "filtered", "compensated"),
         rate=50,
-        spare=STATES,  # they estimate the force from the motors' torques
+        spare=("FrankaRobotState", "FrankaState"),  # an estimate from the motors' torques
     ),
     "pose": Role(
         "end-effector pose (a geometry_msgs/PoseStamped topic)",
+        ("pose", "joints", "transforms"),
         hints=("current", "ee", "eef", "tcp", "end_effector", "measured"),
         doubts=(*COMMANDS, *THINGS),
         rate=10,
-        spare=("Odometry", "PosesInFrame", *TRANSFORMS),
+        spare=("Odometry", "PosesInFrame", "TFMessage", "FrameTransform", "FrameTransforms"),
     ),
     "gripper": Role(
         "gripper (a sensor_msgs/JointState topic)",
+        ("joints",),
         hints=("gripper", "finger", "hand"),
         doubts=COMMANDS,
     ),
     "color": Role(
         "colour images (a sensor_msgs/Image or CompressedImage topic)",
+        ("picture",),
         hints=("color", "colour", "rgb"),
         doubts=("infra", "ir", "left", "right", "depth", "mask", "debug"),
     ),
     "depth": Role(
         "depth images (16UC1 or 32FC1, raw or compressedDepth)",
+        ("picture",),
         hints=("aligned", "registered", "depth"),
         doubts=("mask", "debug"),
     ),
-    "color_info": Role("camera info of the colour images"),
-    "depth_info": Role("camera info of the depth images"),
+    "color_info": Role("camera info of the colour images", ("info",)),
+    "depth_info": Role("camera info of the depth images", ("info",)),
 }
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A channel that could play a role."""
-
-    role: Role
-    readers: Mapping[str, Read | None]
-    choice: Choice
-    typical: Reading
-
-    @property
-    def topic(self) -> str:
-        return self.choice.channel.topic
-
-    @property
-    def kind(self) -> str:
-        return kind_of(self.choice.channel.schema.name)
-
-    @property
-    def rate(self) -> float:
-        """Messages a second, by when they were logged."""
-        times = self.choice.channel.log_times
-        span = (max(times) - min(times)) * 1e-9
-        return (len(times) - 1) / span if span > 0 else 0.0
-
-    @property
-    def hints(self) -> list[str]:
-        """The role's hints in the topic's name: whole words, or long ones within words."""
-        name = self.topic.lower()
-        return [h for h in self.role.hints if h in self._words or (len(h) > 3 and h in name)]
-
-    @property
-    def doubts(self) -> list[str]:
-        return [doubt for doubt in self.role.doubts if doubt in self._words]
-
-    @property
-    def _words(self) -> list[str]:
-        return re.findall("[a-z]+", self.topic.lower())  # infra1 is infra
-
-    def standing(self) -> tuple:
-        """What decides: measured, not spare, no doubts, a likely rate, kind, whether hints."""
-        return (
-            not set(self.doubts) & set(COMMANDS),
-            self.kind not in self.role.spare,
-            -len(self.doubts),
-            self.rate >= self.role.rate,
-            -list(self.readers).index(self.kind),
-            bool(self.hints),
-        )
-
-    def merit(self) -> tuple:
-        """The standing; among topics of one standing number of messages, and the alphabet."""
-        count = len(self.choice.channel.payloads)
-        return *self.standing(), count, [-ord(c) for c in self.topic]
+def _words(name: str) -> set[str]:
+    return {*re.findall("[a-z]+", name.lower())}  # infra1 is infra
 
 
-def source_of(
-    role: str,
-    channel: Channel,
-    decode: Decoder,
-    setup: SetupParams,
-    still: TransformTree,
-    named: bool,
-) -> Source | None:
-    """How to read a channel for a role, and how to convert what was read.
-
-    None where it is of the right type, but something else, which is no news to anybody.
-
-    Args:
-        role: One of ROLES; the channel's schema is among those of its readers.
-        channel, decode: The topic.
-        still: What does not move.
-        named: Whether params name the topic.
-
-    Raises:
-        UserError: where it would be if params said more, or if it could be read.
-    """
-    kind = kind_of(channel.schema.name)
-    if role == "gripper":
-        return _gripper(channel, decode, named)
-    if role == "pose" and kind in READERS["gripper"]:
-        return _arm(channel, decode, setup)
-    if role == "pose" and kind in TRANSFORMS:
-        if _is_static(channel):
-            return None
-        return _hand_of(channel, decode, setup, still), None
-    read = READERS[role][kind]
-    return read and (read, None)
+def _rate(topic: Topic) -> float:
+    """Messages a second, by when they were logged."""
+    span = (max(topic.log_times) - min(topic.log_times)) * 1e-9
+    return (len(topic.log_times) - 1) / span if span > 0 else 0.0
 
 
-def _hand_of(channel: Channel, decode: Decoder, setup: SetupParams, still: TransformTree) -> Read:
-    """How to read the hand's pose from transforms that are published all the time.
-
-    The hand is setup.tip_link, or the one frame named like a tool; its pose is given in the frame
-    from which on up nothing moves. Each message must hold all that moves between the two.
-
-    Raises UserError where no such frame moves.
-    """
-    some, _ = readable(message_reader(decode, edges_of), channel.payloads, JOINT_TRIES)
-    parents = {child: parent for parent, child in {edge for edge, _ in chain.from_iterable(some)}}
-    moving = {*parents}
-    parents |= {child: parent for child, parent in still.parents.items() if child not in parents}
-    tools = [name for name in parents if set(name.lower().split("_")) & {*TOOLS}]
-    tips = [setup.tip_link] if setup.tip_link in parents else sorted(tools)
-    chains = []
-    for frame in tips:
-        up = [frame]
-        while up[-1] in parents and len(up) <= len(parents):
-            up.append(parents[up[-1]])
-        last = max((k for k, name in enumerate(up) if name in moving), default=-1)
-        if last >= 0:
-            chains.append(up[: last + 2])
-    if len(chains) != 1:
-        raise UserError(
-            f"{channel.topic} moves {few(sorted(moving), SHOWN)}: name the frame of the tool centre"
-            " point in setup.tip_link"
-        )
-    (up,) = chains
-    fixed = {child: still.between(parent, child) for child, parent in zip(up, up[1:], strict=False)}
-
-    def read(message: Message) -> Reading:
-        seen = {child: Transform.of(pose) for (_, child), pose in edges_of(message)}
-        if not moving & {*up} & {*seen}:
-            raise Elsewhere("other frames")
-        pose = Transform.identity()
-        for child in up[:-1]:
-            step = seen.get(child) or (None if child in moving else fixed[child])
-            if step is None:
-                raise ValueError(f"the transform of {child} is missing")
-            pose = step @ pose
-        stamped = getattr(message, "transforms", [message])[0]
-        return Reading(stamp_of(stamped), up[-1], tuple(pose.pose()))
-
-    return read
+def _hints(role: Role, name: str) -> list[str]:
+    """The role's hints in a topic's name: whole words, or long ones within words."""
+    return [h for h in role.hints if h in _words(name) or (len(h) > 3 and h in name.lower())]
 
 
-def _gripper(channel: Channel, decode: Decoder, named: bool) -> Source | None:
-    """The joints of a gripper, not of an arm; all joints where params name the topic."""
-    by_topic = named or _has(FINGERS, channel.topic)
-    for names in _joint_names(channel, decode):
-        fingers = tuple(name for name in names if _has(FINGERS, name))
-        if fingers or by_topic:
-            only = tuple(name for name in fingers if "finger" in name.lower())
-            moving = only or fingers or names
-            return fingers_reader(moving), partial(opening_of, topic=channel.topic, names=moving)
-    return None
-
-
-def _arm(channel: Channel, decode: Decoder, setup: SetupParams) -> Source | None:
-    """Joint states through params' URDF."""
-    joint_names = _joint_names(channel, decode)
-    arms = [some for some in joint_names if not all(_has(FINGERS, name) for name in some)]
-    if not arms:
-        return None
-    names = arms[0]
-    has = ", ".join(names[:JOINTS_SHOWN])
-    if setup.urdf is None:
-        raise UserError(
-            f"{channel.topic} has the joints {has}: put the robot's URDF into robots/ and name it"
-            " in setup.urdf"
-        )
-    chain = chain_of(setup.urdf, setup.tip_link)
-    if not any(set(chain.names) <= set(some) for some in joint_names):
-        lacks = ", ".join([name for name in chain.names if name not in names][:JOINTS_SHOWN])
-        raise UserError(
-            f"{channel.topic} lacks joint {lacks} of {setup.urdf}, it has {has}: check setup.urdf"
-            " and setup.tip_link"
-        )
-    return joints_reader(chain.names, chain.root), chain.poses
-
-
-def _joint_names(channel: Channel, decode: Decoder) -> list[tuple[str, ...]]:
-    """Names in the first messages, the most frequent first. Raises UserError if there are none."""
-    read = message_reader(decode, lambda message: tuple(joints_of(message)))
-    messages, _ = readable(read, islice(channel.payloads, JOINT_TRIES), None)
-    names = [some for some, _ in Counter(messages).most_common() if some]
-    if not names:
-        raise UserError(f"{channel.topic} has fewer than two readable messages (no positions)")
-    return names
-
-
-def _has(words: tuple[str, ...], name: str) -> bool:
-    return any(word in name.lower() for word in words)
+def _standing(role: Role, topic: Topic) -> tuple:
+    """What decides: measured, not spare, no doubts, a likely rate, type, whether hints."""
+    doubts = _words(topic.name) & {*role.doubts}
+    return (
+        not doubts & {*COMMANDS},
+        topic.kind not in role.spare,
+        -len(doubts),
+        _rate(topic) >= role.rate,
+        -role.types.index(topic.kind),
+        bool(_hints(role, topic.name)),
+    )
 
 
 def choose(
     container: Container, setup: SetupParams, still: TransformTree | None = None
 ) -> dict[str, Choice]:
-    """Role to channel, for every role of ROLES that the file has.
+    """Role to topic, for every role of ROLES that the file has.
 
     Args:
         container: What was read.
@@ -362,16 +206,15 @@ def choose(
 def camera_of(chosen: dict[str, Choice], role: str) -> Camera:
     """The camera of the images of `role`, color or depth. Raises UserError."""
     info, image = chosen[f"{role}_info"], chosen[role]
-    calibration, topic = info.typical().value, image.channel.topic
-    return camera_from(info.channel.topic, calibration, topic, _size(image))
+    return camera_from(info.name, info.typical.value, image.name, _size(image))
 
 
 class _Chooser:
-    """Goes through the channels of one file, role by role."""
+    """Goes through the topics of one file, role by role."""
 
     def __init__(self, container: Container, setup: SetupParams, still: TransformTree) -> None:
-        self.container, self.setup, self.still = container, setup, still
-        self.problems: list[str] = []  # why channels of the right type could not be used
+        self.topics, self.setup, self.still = container.topics, setup, still
+        self.problems: list[str] = []  # why topics of the right type could not be used
         self.ambiguous: list[str] = []  # settings of roles that several topics could play
 
     def choice(self, role: str, chosen: dict[str, Choice]) -> Choice | None:
@@ -379,147 +222,281 @@ class _Chooser:
         name = getattr(self.setup.topics, role)
         if name is not None:
             return self._named(role, name)
-        fitting = [self._candidate(role, channel) for channel in self.container.channels]
-        candidates = [topic for topic in fitting if topic is not None and self._suits(role, topic)]
+        fitting = [self._read(role, topic) for topic in self.topics]
+        fitting = [choice for choice in fitting if choice and self._suits(role, choice)]
         if role.endswith("_info"):
-            return self._info(candidates, role.removesuffix("_info"), chosen)
-        if not candidates:
+            return self._info(fitting, role.removesuffix("_info"), chosen)
+        if not fitting:
             return None
         if role == "depth":
-            candidates = _nearest(candidates, chosen["color"])
-        best = max(candidates, key=Candidate.merit)
-        alike = {_source(c.topic) for c in candidates if c.standing() == best.standing()}
+            fitting = _nearest(fitting, chosen["color"])
+        best = max(fitting, key=lambda c: (_standing(ROLES[role], c.topic), len(c.messages)))
+        standing = _standing(ROLES[role], best.topic)
+        alike = {_source(c.name) for c in fitting if _standing(ROLES[role], c.topic) == standing}
         if len(alike) > 1:
             self.ambiguous.append(f"setup.topics.{role} {few(sorted(alike), SHOWN)}")
-        return replace(best.choice, why=_why(best, candidates))
+        return replace(best, why=_why(ROLES[role], best, fitting))
 
     def lacking(self, role: str) -> UserError:
         what = ROLES[role].what
         if role in CAMERAS:
-            self.problems += [
-                f"{c.topic} is video ({kind_of(_type(c))}): record images"
-                for c in self.container.channels
-                if kind_of(_type(c)) in VIDEO
-            ]
+            video = [topic for topic in self.topics if topic.kind in VIDEO]
+            self.problems += [f"{t.name} is video ({t.kind}): record images" for t in video]
         if self.problems:
             return UserError(f"no {what}; {'; or '.join(self.problems[:2])}")
-        if not self.container.channels:
+        if not self.topics:
             return UserError(f"no {what}; the file has no messages at all: record it again")
-        has = sorted({f"{c.topic} ({kind_of(_type(c))})" for c in self.container.channels})
-        types = ", ".join(READERS[role])
+        has = sorted({f"{topic.name} ({topic.kind or _type(topic)})" for topic in self.topics})
+        types = ", ".join(ROLES[role].types)
         return UserError(
             f"no {what}; the file has {few(has, SHOWN)}, and none of a type that is read for it"
             f" ({types}): record one"
         )
 
     def _named(self, role: str, name: str) -> Choice:
-        channels = [c for c in self.container.channels if c.topic == name]
-        where = f"setup.topics.{role}"
-        if not channels:
-            has = ", ".join(sorted({c.topic for c in self.container.channels})[:SHOWN])
+        topics = [topic for topic in self.topics if topic.name == name]
+        where, types = f"setup.topics.{role}", ROLES[role].types
+        if not topics:
+            has = ", ".join(sorted({topic.name for topic in self.topics})[:SHOWN])
             raise UserError(f"{where}: no topic {name}, the file has {has or 'none'}")
-        readers = READERS[role]
-        fitting = [c for c in channels if kind_of(c.schema.name) in readers]
+        fitting = [topic for topic in topics if topic.kind in types]
         if not fitting:
-            types = " or ".join(readers)
-            raise UserError(f"{where}: {name} is a {_type(channels[0])}, not {types}")
-        candidate = self._candidate(role, max(fitting, key=lambda c: len(c.payloads)), named=True)
-        if candidate is None:
+            raise UserError(f"{where}: {name} is a {_type(topics[0])}, not {' or '.join(types)}")
+        largest = max(fitting, key=lambda topic: len(topic.log_times))
+        choice = self._read(role, largest, named=True)
+        if choice is None:
             problem = (self.problems or [f"{name} has no messages, or fingers only"])[0]
             raise UserError(f"{where}: {problem}")
-        if role in CAMERAS and (problem := undecodable(role, candidate.choice)):
+        if role in CAMERAS and (problem := undecodable(role, choice)):
             raise UserError(f"{where}: {name}: {problem}")
-        return replace(candidate.choice, why=f"setup.topics.{role}")
+        return replace(choice, why=where)
 
-    def _candidate(self, role: str, channel: Channel, named: bool = False) -> Candidate | None:
-        """None, with a word in `problems`, for a channel of the right type that is of no use."""
-        if kind_of(channel.schema.name) not in READERS[role] or not channel.payloads:
+    def _read(self, role: str, topic: Topic, named: bool = False) -> Choice | None:
+        """What a topic says for a role; None, with a word in `problems`, where it is of no use."""
+        what = {*ROLES[role].shows} & {*topic.readings}
+        if not what:
             return None
         try:
-            decode = decoder(channel)
-            source = source_of(role, channel, decode, self.setup, self.still, named)
-            if source is None:
-                return None
-            read, convert = source
-            choice = Choice(channel, message_reader(decode, read), "", convert)
-            return Candidate(ROLES[role], READERS[role], choice, choice.typical())
+            if topic.problem:
+                raise UserError(topic.problem)
+            if role == "gripper":
+                choice = _gripper(topic, named)
+            elif what == {"joints"}:
+                choice = _arm(topic, self.setup)
+            elif what == {"transforms"}:
+                choice = None if _is_static(topic) else _hand(topic, self.setup, self.still)
+            else:
+                choice = Choice(topic, _all(topic, *what))
+            return choice if choice and choice.typical else None
         except UserError as error:
             self.problems.append(str(error))
             return None
 
-    def _suits(self, role: str, candidate: Candidate) -> bool:
+    def _suits(self, role: str, choice: Choice) -> bool:
         """Pictures: whether they are colour or depth, and of a kind that can be decoded."""
         if role not in CAMERAS:
             return True
-        picture, named = candidate.typical.value, "depth" in candidate.topic.lower()
+        picture, named = choice.typical.value, "depth" in choice.name.lower()
         deep = images.is_depth(picture) or (picture.encoding == "mono16" and named)
-        if deep != (role == "depth"):
-            if named and role == "depth" and picture.encoding:
-                what = f"encoding {picture.encoding!r} is no depth, {images.USE}"
-                self.problems.append(f"{candidate.topic}: {what}")
-            return False
-        problem = undecodable(role, candidate.choice)
+        problem = None
+        if deep == (role == "depth"):
+            problem = undecodable(role, choice)
+        elif named and role == "depth" and picture.encoding:
+            problem = f"encoding {picture.encoding!r} is no depth, {images.USE}"
         if problem:
-            self.problems.append(f"{candidate.topic}: {problem}")
-        return problem is None
+            self.problems.append(f"{choice.name}: {problem}")
+        return deep == (role == "depth") and not problem
 
-    def _info(
-        self, candidates: Sequence[Candidate], role: str, chosen: dict[str, Choice]
-    ) -> Choice | None:
+    def _info(self, infos: Sequence[Choice], role: str, chosen: dict[str, Choice]) -> Choice | None:
         """A camera info belongs to the images in whose folder it is, or with their frame and size.
 
         Depth may take the colour camera's where it is registered to colour: in its frame and size.
         """
         image, color = chosen[role], chosen["color"]
-        topic, frame, size = image.channel.topic, image.typical().frame, _size(image)
-        ranked = []
-        for candidate in candidates:
-            camera = candidate.typical.value.camera
-            beside = _beside(candidate.topic, topic)
-            of_color = _beside(candidate.topic, color.channel.topic)
-            beside_it = beside and (role == "color" or not of_color)
-            info_frame = camera.frame or (color.typical().frame if of_color else "")
-            fits = size is None or size == (camera.width, camera.height)
-            if beside_it or (info_frame == frame and (fits or beside)):
-                why = f"beside {topic}" if beside else f"of the frame and size of {topic}"
-                count = len(candidate.choice.channel.payloads)
-                merit = beside_it, info_frame == frame, fits, beside, count
-                ranked.append((merit, [-ord(c) for c in candidate.topic], why, candidate.choice))
+        frame, size, ranked = image.typical.frame, _size(image), []
+        for info in infos:
+            camera = info.typical.value.camera
+            beside, of_color = _beside(info.name, image.name), _beside(info.name, color.name)
+            own = beside and (role == "color" or not of_color)
+            of_frame = (camera.frame or (color.typical.frame if of_color else "")) == frame
+            fits = size in (None, (camera.width, camera.height))
+            if own or (of_frame and (fits or beside)):
+                why = f"{'beside' if beside else 'of the frame and size of'} {image.name}"
+                merit = own, of_frame, fits, beside, len(info.messages)
+                ranked.append((merit, replace(info, why=why)))
             else:
                 pixels = f", {size[0]} x {size[1]}" if size else ""
                 self.problems.append(
-                    f"{candidate.topic} is of frame {info_frame!r}, {camera.width} x"
-                    f" {camera.height} pixels, {topic} of {frame!r}{pixels}: record the camera info"
-                    f" of those images, or name it in setup.topics.{role}_info"
+                    f"{info.name} is of frame {camera.frame!r}, {camera.width} x {camera.height}"
+                    f" pixels, {image.name} of {frame!r}{pixels}: record the camera info of those"
+                    f" images, or name it in setup.topics.{role}_info"
                 )
-        if not ranked:
+        return max(ranked, key=lambda entry: entry[0], default=(None, None))[1]
+
+
+def _type(topic: Topic) -> str:
+    return topic.schema.name or f"{topic.encoding} topic without a schema"
+
+
+def _all(topic: Topic, what: str) -> Messages:
+    return list(zip(topic.log_times, topic.readings[what], strict=True))
+
+
+def _mapped(topic: Topic, what: str, read: Callable[[Reading], Reading | None]) -> Messages:
+    """What `read` makes of each reading: None, of a message of another publisher, is left out."""
+    messages = []
+    for time, reading in _all(topic, what):
+        if isinstance(reading, Reading):
+            try:
+                reading = read(reading)
+            except ValueError as error:
+                reading = Unreadable.by(error)
+        if reading is not None:
+            messages.append((time, reading))
+    return messages
+
+
+def _joints(topic: Topic, names: tuple[str, ...], frame: str | None = None) -> Messages:
+    """Positions of these joints, in this order, of the messages that have any of them."""
+
+    def read(reading: Reading) -> Reading | None:
+        missing = [name for name in names if name not in reading.value]
+        if len(missing) == len(names):
             return None
-        *_, why, choice = max(ranked, key=lambda entry: entry[:2])
-        return replace(choice, why=why)
+        if missing:
+            raise ValueError(f"joint {missing[0]} is missing")
+        values = tuple(reading.value[name] for name in names)
+        return Reading(reading.stamp, reading.frame if frame is None else frame, values)
+
+    return _mapped(topic, "joints", read)
 
 
-def _type(channel: Channel) -> str:
-    return channel.schema.name or f"{channel.encoding} topic without a schema"
+def _joint_names(topic: Topic) -> list[tuple[str, ...]]:
+    """Names in the first messages, the most frequent first. Raises UserError if there are none."""
+    some = Choice(topic, _all(topic, "joints")).readings[:JOINT_TRIES]
+    counts = Counter(tuple(reading.value) for reading in some)
+    names = [some for some, _ in counts.most_common() if some]
+    if not names:
+        raise UserError(f"{topic.name} has fewer than two readable messages (no positions)")
+    return names
+
+
+def _gripper(topic: Topic, named: bool) -> Choice | None:
+    """The joints of a gripper, not of an arm; all joints where params name the topic."""
+    for names in _joint_names(topic):
+        fingers = tuple(filter(_is_finger, names))
+        if fingers or named or _is_finger(topic.name):
+            only = tuple(name for name in fingers if "finger" in name.lower())
+            moving = only or fingers or names
+            convert = partial(opening_of, topic=topic.name, names=moving)
+            return Choice(topic, _joints(topic, moving), convert=convert)
+    return None
+
+
+def opening_of(values: np.ndarray, topic: str, names: tuple[str, ...]) -> np.ndarray:
+    """Opening of a hand, shape (S, 1), from the positions of its fingers (S, C).
+
+    Fingers of a mirrored sign count the other way round, those that hardly move not at all. Raises
+    UserError where the others do not move as one, as those of two hands.
+    """
+    moved = np.ptp(values, axis=0)
+    counts = moved >= MOVES * moved.max()
+    fingers = values[:, counts]
+    if moved.max() == 0:
+        return fingers.sum(axis=1, keepdims=True)
+    likeness = np.corrcoef(fingers.T, values[:, np.argmax(moved)])[-1, :-1]
+    if np.abs(likeness).min() < ALIKE:
+        moving = ", ".join(name for name, counted in zip(names, counts, strict=True) if counted)
+        raise UserError(f"{topic}: the joints {moving} do not move as the fingers of one hand")
+    return (fingers * np.sign(likeness)).sum(axis=1, keepdims=True)
+
+
+def _arm(topic: Topic, setup: SetupParams) -> Choice | None:
+    """Joint states through params' URDF."""
+    joint_names = _joint_names(topic)
+    arms = [some for some in joint_names if not all(map(_is_finger, some))]
+    if not arms:
+        return None
+    names = arms[0]
+    has = ", ".join(names[:SHOWN])
+    if setup.urdf is None:
+        raise UserError(
+            f"{topic.name} has the joints {has}: put the robot's URDF into robots/ and name it in"
+            " setup.urdf"
+        )
+    chain = chain_of(setup.urdf, setup.tip_link)
+    if not any(set(chain.names) <= set(some) for some in joint_names):
+        lacks = ", ".join([name for name in chain.names if name not in names][:SHOWN])
+        raise UserError(
+            f"{topic.name} lacks joint {lacks} of {setup.urdf}, it has {has}: check setup.urdf and"
+            " setup.tip_link"
+        )
+    return Choice(topic, _joints(topic, chain.names, chain.root), convert=chain.poses)
+
+
+def _is_finger(name: str) -> bool:
+    return any(word in name.lower() for word in FINGERS)
+
+
+def _hand(topic: Topic, setup: SetupParams, still: TransformTree) -> Choice:
+    """The hand's pose from transforms that are published all the time.
+
+    The hand is setup.tip_link, or the one frame named like a tool; its pose is given in the frame
+    from which on up nothing moves. Each message must hold all that moves between the two.
+
+    Raises UserError where no such frame moves.
+    """
+    some = Choice(topic, _all(topic, "transforms")).readings[:JOINT_TRIES]
+    moving = {child: parent for reading in some for parent, child in reading.value}
+    parents = still.parents | moving
+    tools = [name for name in parents if {*name.lower().split("_")} & TOOLS]
+    chains = []
+    for tip in [setup.tip_link] if setup.tip_link in parents else sorted(tools):
+        up = [tip]
+        while up[-1] in parents and len(up) <= len(parents):
+            up.append(parents[up[-1]])
+        last = max((k for k, name in enumerate(up) if name in moving), default=-1)
+        if last >= 0:
+            chains.append(up[: last + 2])
+    if len(chains) != 1:
+        raise UserError(
+            f"{topic.name} moves {few(sorted(moving), SHOWN)}: name the frame of the tool centre"
+            " point in setup.tip_link"
+        )
+    (up,) = chains
+    fixed = {child: still.between(parent, child) for child, parent in zip(up, up[1:], strict=False)}
+
+    def read(reading: Reading) -> Reading | None:
+        seen = {child: Transform.of(pose) for (_, child), pose in reading.value.items()}
+        if not {*moving} & {*up} & {*seen}:
+            return None
+        pose = Transform.identity()
+        for child in up[:-1]:
+            step = seen.get(child) or (None if child in moving else fixed[child])
+            if step is None:
+                raise ValueError(f"the transform of {child} is missing")
+            pose = step @ pose
+        return Reading(reading.stamp, up[-1], tuple(pose.pose()))
+
+    return Choice(topic, _mapped(topic, "transforms", read))
 
 
 def _size(image: Choice) -> tuple[int, int] | None:
     """Width and height that most of the first pictures tell."""
-    sizes, _ = readable(
-        lambda payload: images.size_of(image.read(payload).value), image.channel.payloads
-    )
-    counted = Counter(size for size in sizes if size is not None)
-    return counted.most_common(1)[0][0] if counted else None
+    read = [images.size_of(reading.value) for reading in image.readings[:TRIES]]
+    sizes = Counter(size for size in read if size)
+    return sizes.most_common(1)[0][0] if sizes else None
 
 
 def undecodable(role: str, choice: Choice) -> str | None:
     """Why none of some pictures of a topic can be decoded; None where one can."""
-    payloads, reasons = choice.channel.payloads, Counter()
-    for k in np.unique(np.linspace(0, len(payloads) - 1, min(TRIES, len(payloads))).astype(int)):
+    pictures, reasons = choice.readings, Counter()
+    for k in np.unique(np.linspace(0, len(pictures) - 1, TRIES).astype(int)):
         try:
-            getattr(images, role)(choice.read(payloads[k]).value)
+            getattr(images, role)(pictures[k].value)
         except images.Unsupported as error:
             reasons[str(error)] += 1
-        except (images.Undecodable, Unreadable) as error:
+        except images.Undecodable as error:
             reasons[f"its {COLOUR[role]} pictures cannot be decoded: {error}"] += 1
         else:
             return None
@@ -531,12 +508,12 @@ def _source(topic: str) -> str:
     return topic.removesuffix("/compressed").removesuffix("/compressedDepth")
 
 
-def _nearest(depths: list[Candidate], color: Choice) -> list[Candidate]:
+def _nearest(depths: list[Choice], color: Choice) -> list[Choice]:
     """Those in the colour's frame, or else those that share the most folders with its topic."""
-    frame, topic = color.typical().frame, color.channel.topic
+    frame = color.typical.frame
 
-    def near(depth: Candidate) -> tuple[bool, int]:
-        folders = (name.split("/")[:-1] for name in (depth.topic, topic))
+    def near(depth: Choice) -> tuple[bool, int]:
+        folders = (name.split("/")[:-1] for name in (depth.name, color.name))
         return bool(frame) and depth.typical.frame == frame, len(commonprefix([*folders]))
 
     most = max(map(near, depths))
@@ -549,13 +526,14 @@ def _beside(info: str, image: str) -> bool:
     return any(folder) and folder in (parts[:-1], parts[:-2])
 
 
-def _why(best: Candidate, candidates: list[Candidate]) -> str:
-    if len(candidates) == 1:
-        return f"the only {best.kind} for {best.role.what.partition(' (')[0]}"
-    named = f"named {' '.join(best.hints)}, " if best.hints else ""
-    others = sorted({candidate.topic for candidate in candidates} - {best.topic})[:2]
+def _why(role: Role, best: Choice, fitting: list[Choice]) -> str:
+    if len(fitting) == 1:
+        return f"the only {best.topic.kind} for {role.what.partition(' (')[0]}"
+    hints = _hints(role, best.name)
+    named = f"named {' '.join(hints)}, " if hints else ""
+    others = sorted({choice.name for choice in fitting} - {best.name})[:2]
     rest = f"; not {', '.join(others)}" if others else ""
-    return f"of {len(candidates)} topics: {named}{best.rate:.0f} Hz{rest}"
+    return f"of {len(fitting)} topics: {named}{_rate(best.topic):.0f} Hz{rest}"
 
 
 def transforms_of(container: Container) -> TransformTree:
@@ -564,29 +542,26 @@ def transforms_of(container: Container) -> TransformTree:
     Messages that cannot be read are left out: a transform that is missed is asked for later.
     """
     poses: dict[Edge, np.ndarray] = {}
+    parents: dict[str, str] = {}
     moving: set[Edge] = set()
     tree = TransformTree()
-    for channel in container.channels:
-        static = _is_static(channel)
-        if kind_of(channel.schema.name) not in TRANSFORMS:
-            continue
-        try:
-            decode = decoder(channel)
-        except UserError:
-            continue
-        messages, _ = readable(message_reader(decode, edges_of), channel.payloads, None)
-        for edge, pose in chain.from_iterable(messages):
-            changes = np.abs(poses.get(edge, pose) - pose).max() > STILL
-            if static and (changes or any(c == edge[1] and p != edge[0] for p, c in poses)):
-                tree.doubled.add(edge[1])
-            elif changes:
-                moving.add(edge)
-            poses[edge] = pose
+    for topic in container.topics:
+        static = _is_static(topic)
+        for reading in topic.readings.get("transforms", []):
+            edges: Mapping[Edge, np.ndarray] = getattr(reading, "value", {})
+            for edge, pose in edges.items():
+                parent, child = edge
+                changes = np.abs(poses.get(edge, pose) - pose).max() > STILL
+                if static and (changes or parents.get(child, parent) != parent):
+                    tree.doubled.add(child)
+                elif changes:
+                    moving.add(edge)
+                poses[edge], parents[child] = pose, parent
     for edge, pose in poses.items():
         if edge not in moving:
             tree.add(*edge, Transform.of(pose))
     return tree
 
 
-def _is_static(channel: Channel) -> bool:
-    return channel.topic.rsplit("/", 1)[-1] == "tf_static"
+def _is_static(topic: Topic) -> bool:
+    return topic.name.rsplit("/", 1)[-1] == "tf_static"

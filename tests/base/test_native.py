@@ -8,7 +8,7 @@ STARTED_TWICE = """
 import time
 from concurrent.futures import ThreadPoolExecutor
 import warp._src.context as context
-from sling2sim2real.identification.objective.kernel import chamfer_kernel
+from sling2sim2real.identification.objective.kernels import chamfer_kernel
 
 starts, runtime = [], context.Runtime
 
@@ -19,7 +19,7 @@ def slow(*args):
 
 context.Runtime = slow
 with ThreadPoolExecutor(2) as pool:
-    list(pool.map(lambda edges: chamfer_kernel(edges, 4, 4), (4, 6)))
+    list(pool.map(lambda edges: chamfer_kernel("tube", edges, 4), (4, 6)))
 print(len(starts))
 """
 SOMETHING_ELSE = """

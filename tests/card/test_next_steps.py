@@ -57,7 +57,7 @@ def test_a_dip_is_recommended_where_no_pull_unloads() -> None:
     (explained,) = [
         step for step in next_steps([], free, targets, pulls, unloaded=False) if "dip" in step
     ]
-    less = free.after(free.exact(["softening"]))[1]
+    less = free.after(free.known("softening"))[1]
     after = float(explained.split("±")[2].split()[0]) / 100
     assert less <= after + 5e-4 and after < 0.8 * free.half_width[1]
     assert after == pytest.approx(less, abs=0.01)

@@ -1,4 +1,4 @@
-"""Channels of JSON messages, made in memory, of a hand whose motion is a formula."""
+"""Topics of JSON messages, made in memory, of a hand whose motion is a formula."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from mcap.records import Schema
 from scipy.spatial.transform import Rotation
 
 from sling2sim2real.recording.files import Container
-from sling2sim2real.recording.messages import Channel
-from sling2sim2real.recording.topics import choose
+from sling2sim2real.recording.messages import Reading, Topic
+from sling2sim2real.recording.topics import Choice, choose
 
 COUNT, RATE = 200, 100.0
 TIMES = np.arange(COUNT) / RATE
@@ -25,15 +25,14 @@ def head(k: int, frame: str = "base") -> dict:
     return {"header": {"stamp": {"sec": 5, "nanosec": round(1e9 * TIMES[k])}, "frame_id": frame}}
 
 
-def channel(topic: str, kind: str, messages: list[dict], rate: float = RATE) -> Channel:
-    schema = Schema(1, b"{}", "jsonschema", kind)
-    times = [5_000_000_000 + round(1e9 * k / rate) for k in range(len(messages))]
-    return Channel(
-        topic, schema, "json", times, [json.dumps(message).encode() for message in messages]
-    )
+def channel(name: str, kind: str, messages: list[dict], rate: float = RATE) -> Topic:
+    topic = Topic.of(name, Schema(1, b"{}", "jsonschema", kind), "json")
+    for k, message in enumerate(messages):
+        topic.add(5_000_000_000 + round(1e9 * k / rate), json.dumps(message).encode())
+    return topic
 
 
-def wrench(topic: str, rate: float = 1000.0, count: int = COUNT) -> Channel:
+def wrench(topic: str, rate: float = 1000.0, count: int = COUNT) -> Topic:
     messages = [{**head(k, "sensor"), "wrench": {"force": FORCE}} for k in range(count)]
     return channel(topic, "geometry_msgs/WrenchStamped", messages, rate)
 
@@ -43,19 +42,19 @@ def pose_fields(pose: np.ndarray) -> dict:
     return {"position": position, "orientation": dict(zip("xyzw", pose[3:], strict=True))}
 
 
-def pose(topic: str = "/arm/current_pose", rate: float = RATE) -> Channel:
+def pose(topic: str = "/arm/current_pose", rate: float = RATE) -> Topic:
     messages = [{**head(k), "pose": pose_fields(POSES[k])} for k in range(COUNT)]
     return channel(topic, "geometry_msgs/msg/PoseStamped", messages, rate)
 
 
-def joints(topic: str, names: list[str], positions: np.ndarray) -> Channel:
+def joints(topic: str, names: list[str], positions: np.ndarray) -> Topic:
     messages = [
         {**head(k, ""), "name": names, "position": list(positions[k])} for k in range(COUNT)
     ]
     return channel(topic, "sensor_msgs/msg/JointState", messages)
 
 
-def picture(topic: str, encoding: str, frame: str, width: int = 4, height: int = 2) -> Channel:
+def picture(topic: str, encoding: str, frame: str, width: int = 4, height: int = 2) -> Topic:
     size = {"rgb8": 3, "bayer_rggb8": 1, "16UC1": 2, "mono16": 2}[encoding]
     fields = {"height": height, "width": width, "step": size * width, "encoding": encoding}
     messages = [
@@ -64,7 +63,7 @@ def picture(topic: str, encoding: str, frame: str, width: int = 4, height: int =
     return channel(topic, "sensor_msgs/msg/Image", messages, 30)
 
 
-def info(topic: str, frame: str, focal: float = 50.0, width: int = 4, height: int = 2) -> Channel:
+def info(topic: str, frame: str, focal: float = 50.0, width: int = 4, height: int = 2) -> Topic:
     k = [focal, 0, 2, 0, focal, 1, 0, 0, 1]
     message = {"width": width, "height": height, "k": k, "d": [], "p": [], "distortion_model": ""}
     return channel(topic, "sensor_msgs/msg/CameraInfo", [{**head(0, frame), **message}] * 2, 30)
@@ -78,15 +77,16 @@ CAMERA = (
 )
 
 
-def chosen(params, *channels: Channel, camera=CAMERA, topics=(), **setup: object):
+def chosen(params, *topics_: Topic, camera=CAMERA, topics=(), **setup: object):
     given = {**setup, "topics": params.setup.topics.model_copy(update=dict(topics))}
-    file = Container(Path("f.mcap"), [*channels, *camera], [])
+    file = Container(Path("f.mcap"), [*topics_, *camera])
     return choose(file, params.setup.model_copy(update=given))
 
 
-def played(choice) -> tuple[str, np.ndarray]:
+def played(choice: Choice) -> tuple[str, np.ndarray]:
     """Frame, and what the reader makes of a topic."""
-    samples = [choice.read(payload) for payload in choice.channel.payloads]
+    samples = [sample for _, sample in choice.messages if isinstance(sample, Reading)]
+    assert len(samples) == len(choice.messages)
     stamps = np.array([sample.stamp for sample in samples])
     np.testing.assert_array_equal(stamps, 5_000_000_000 + np.round(1e9 * TIMES))
     values = np.array([sample.value for sample in samples])

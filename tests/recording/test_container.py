@@ -1,7 +1,8 @@
-"""The container: intact messages come back, what is lost is said, and no size field is believed."""
+"""MCAP: intact messages come back, what is lost is said, no size or name in a file does harm."""
 
 from __future__ import annotations
 
+import gzip
 import struct
 import subprocess
 import sys
@@ -12,24 +13,20 @@ from pathlib import Path
 import lz4.frame
 import pytest
 import zstandard
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from mcap import records as kinds
 from mcap.data_stream import RecordBuilder
 from mcap.writer import CompressionType, Writer
 
+from pipeline.params import load
+from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.recording.files import MAGIC, read_container
-from sling2sim2real.recording.messages import Payloads, Spool
-from tests.project import ROOT
+from sling2sim2real.recording.streams import read_recording
+from sling2sim2real.recording.words import shortened
+from tests.project import DEFAULTS, ROOT
+from validation.recordings.bag import blind_bag
 
 START = 10**18
-SCHEMA = kinds.Schema(id=1, data=b"float64 x", encoding="ros2msg", name="pkg/msg/PoseStamped")
-ANY = settings(
-    max_examples=150,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+SCHEMA = kinds.Schema(id=1, data=b"float64 x", encoding="ros2msg", name="pkg/msg/Joints")
 
 
 def channel(number: int = 1, topic: str = "/x", schema: int = 1) -> kinds.Channel:
@@ -76,31 +73,36 @@ def read(folder: Path, *records, end=END, magic: bytes = MAGIC):
     return read_container(path)
 
 
-def times(container, topic: str = "/x") -> list[int]:
-    matches = [channel_i for channel_i in container.channels if channel_i.topic == topic]
-    return [(t - START) // 10**9 for channel_i in matches for t in channel_i.log_times]
+def times(container, name: str = "/x") -> list[int]:
+    topics = [topic for topic in container.topics if topic.name == name]
+    return [(t - START) // 10**9 for topic in topics for t in topic.log_times]
 
 
 def test_a_plain_file(tmp_path) -> None:
-    file = read(tmp_path, chunk([SCHEMA, channel(), message(0), message(1)]))
-    assert times(file) == [0, 1] and (file.losses, file.notes) == ([], [])
-    assert [*file.channels[0].payloads] == [b"12345678"] * 2
+    """Also where its records come in another order, as long as what they are comes first."""
+    for records in ([SCHEMA, channel()], [channel(), SCHEMA]):
+        file = read(tmp_path, chunk([*records, message(0), message(1)]))
+        assert times(file) == [0, 1] and (file.losses, file.notes) == ([], [])
+        (topic,) = file.topics
+        assert (topic.kind, topic.readings) == ("Joints", {})  # of a type that nobody reads
 
 
-def test_damaged_chunks_are_dropped_with_their_time(tmp_path) -> None:
-    first = chunk([SCHEMA, channel(), message(0)])
-    for bad in (
+@pytest.mark.parametrize(
+    "bad",
+    [
         chunk([message(3)], crc=1),
         chunk([message(3)], size=2**62),
         chunk(packed([message(3)]) + b"\x05\xff"),  # ends within a record
         chunk([message(3)], compression="zstd", size=2**30 + 1),
-        kinds.Chunk("zstd", b"no frame", START + 3 * 10**9, START + 4 * 10**9, 1, 100),
-        kinds.Chunk("lz4", b"no frame", START + 3 * 10**9, START + 4 * 10**9, 1, 100),
-    ):
-        bad.message_start_time, bad.message_end_time = START + 3 * 10**9, START + 4 * 10**9
-        file = read(tmp_path, first, bad, chunk([message(5)]))
-        assert times(file)[0] == 0 and times(file)[-1] == 5
-        assert file.losses == ["1 damaged chunk dropped: 3.00 to 4.00 s"]
+        kinds.Chunk("zstd", b"no frame", START + 4 * 10**9, START + 3 * 10**9, 1, 100),
+        kinds.Chunk("lz4", b"no frame", START + 4 * 10**9, START + 3 * 10**9, 1, 100),
+    ],
+)
+def test_damaged_chunks_are_dropped_with_their_time(tmp_path, bad) -> None:
+    first = chunk([SCHEMA, channel(), message(0)])
+    file = read(tmp_path, first, bad, chunk([message(5)]))
+    assert times(file) == [0, 5]
+    assert file.losses == ["1 damaged chunk dropped: 3.00 to 4.00 s"]
 
 
 def test_a_file_that_is_cut_is_read_up_to_there(tmp_path) -> None:
@@ -122,17 +124,10 @@ def test_a_file_without_checksums_is_said_to_be_one(tmp_path) -> None:
 
 def test_the_checksum_of_an_unchunked_file(tmp_path) -> None:
     path = tmp_path / "file.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file, use_chunking=False, enable_data_crcs=True)
-        writer.start()
-        schema = writer.register_schema("pkg/msg/X", "ros2msg", b"float64 x")
-        number = writer.register_channel("/x", "cdr", schema)
-        for k in range(5):
-            writer.add_message(number, START + k * 10**9, b"12345678", START)
-        writer.finish()
+    written(path, 5, use_chunking=False, enable_data_crcs=True)
     contents = read_container(path)
     assert times(contents) == [0, 1, 2, 3, 4] and (contents.losses, contents.notes) == ([], [])
-    path.write_bytes(path.read_bytes().replace(b"12345678", b"12345679", 1))
+    path.write_bytes(path.read_bytes().replace(b"1234567\x03", b"1234568\x03", 1))
     assert read_container(path).losses == [
         "the checksum of all messages together does not hold: what is damaged is not known"
     ]
@@ -141,28 +136,42 @@ def test_the_checksum_of_an_unchunked_file(tmp_path) -> None:
 def test_one_topic_in_two_channels_is_one(tmp_path) -> None:
     records = [SCHEMA, channel(1), channel(2), message(0, 1), message(1, 2)]
     file = read(tmp_path, chunk(records))
-    assert len(file.channels) == 1 and times(file) == [0, 1]
+    assert len(file.topics) == 1 and times(file) == [0, 1]
 
 
 def test_what_cannot_be_joined_is_said(tmp_path) -> None:
     file = read(tmp_path, chunk([SCHEMA, channel(), message(0), message(1, 7)]))
-    assert file.losses == ["1 message of channel 7 dropped: no record says what it is"]
+    assert file.losses == ["1 message dropped: no record before says what it is"]
     file = read(tmp_path, chunk([channel(), message(0)]))
-    assert file.losses == ["1 message of /x dropped: its schema is missing"]
+    assert file.losses == ["1 message dropped: no record before says what it is"]
     file = read(tmp_path, chunk([channel(schema=0), message(0)]))
-    assert times(file) == [0] and file.channels[0].schema.name == "" and file.losses == []
+    assert times(file) == [0] and file.topics[0].schema.name == "" and file.losses == []
+
+
+def test_what_the_first_chunk_says_is_found_at_the_end(tmp_path) -> None:
+    path = tmp_path / "file.mcap"
+    written(path, 3, chunk_size=60)
+    content = path.read_bytes()
+    path.write_bytes(content.replace(b"float64 x", b"float64 y", 1))  # in the first chunk
+    file = read_container(path)
+    assert times(file) == [1, 2] and "1 damaged chunk dropped" in file.losses[0]
+
+
+def written(path: Path, count: int, **options) -> None:
+    """By the library's writer."""
+    with path.open("wb") as file:
+        writer = Writer(file, compression=CompressionType.NONE, **options)
+        writer.start()
+        schema = writer.register_schema("pkg/msg/X", "ros2msg", b"float64 x")
+        number = writer.register_channel("/x", "cdr", schema)
+        for k in range(count):
+            writer.add_message(number, START + k * 10**9, b"1234567" + bytes([k]), START)
+        writer.finish()
 
 
 def test_the_count_of_the_file_is_compared(tmp_path) -> None:
     path = tmp_path / "file.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file, chunk_size=60, compression=CompressionType.NONE)
-        writer.start()
-        schema = writer.register_schema("pkg/msg/X", "ros2msg", b"float64 x")
-        number = writer.register_channel("/x", "cdr", schema)
-        for k in range(9):
-            writer.add_message(number, START + k * 10**9, b"1234567" + bytes([k]), START)
-        writer.finish()
+    written(path, 9, chunk_size=60)
     assert (read_container(path).losses, read_container(path).notes) == ([], [])
     content = bytearray(path.read_bytes())
     start = content.rindex(b"\x06", 0, content.index(b"1234567\x05") - 40)
@@ -177,25 +186,6 @@ def test_a_damaged_end_costs_nothing(tmp_path) -> None:
     data = [chunk([SCHEMA, channel(), message(0)])]
     file = read(tmp_path, *data, end=[kinds.DataEnd(0), b"\x0b\xff\xff"])
     assert times(file) == [0] and file.losses == []
-    assert "summary at the file's end is damaged" in file.notes[0]
-
-
-def test_large_types_that_no_role_has_are_counted_only(tmp_path) -> None:
-    cloud = kinds.Schema(id=1, data=b"", encoding="ros2msg", name="sensor_msgs/msg/PointCloud2")
-    file = read(tmp_path, chunk([cloud, channel(), message(0)]))
-    assert [*file.channels[0].payloads] == [b""] and times(file) == [0]
-
-
-def test_what_memory_is_not_for_lies_in_a_file() -> None:
-    spool = Spool(held=3000)
-    topics = Payloads(spool), Payloads(spool)
-    sent = [bytes([k]) * (500 + k) for k in range(20)]
-    for k, data in enumerate(sent):
-        topics[k % 2].append(data)
-    assert spool.size > 5000
-    assert [*topics[0]] == sent[0::2] and [*topics[1]] == sent[1::2]
-    topics[0].extend(topics[1])
-    assert len(topics[0]) == 20 and topics[0][-1] == sent[-1]
 
 
 def test_schemas_that_differ_in_a_comment_are_one_topic(tmp_path) -> None:
@@ -203,7 +193,7 @@ def test_schemas_that_differ_in_a_comment_are_one_topic(tmp_path) -> None:
     other = replace(SCHEMA, id=2, data=b"# of another version\nfloat64   x")
     records = [SCHEMA, other, channel(1), channel(2, schema=2), message(0, 1), message(1, 2)]
     file = read(tmp_path, chunk(records))
-    assert len(file.channels) == 1 and times(file) == [0, 1]
+    assert len(file.topics) == 1 and times(file) == [0, 1]
 
 
 # Of each file in a folder what is read or why it is refused.
@@ -215,7 +205,7 @@ from sling2sim2real.recording.files import read_container
 for path in sorted(Path(sys.argv[1]).glob("*.mcap")):
     try:
         found = read_container(path)
-        print(path.stem, sum(len(c.payloads) for c in found.channels), *found.losses)
+        print(path.stem, sum(len(t.log_times) for t in found.topics), *found.losses)
     except UserError as error:
         print(path.stem, "refused", error)
 held = open("/proc/self/status").read().split("VmHWM:")[1].split()[0]  # no memory of who began it
@@ -267,11 +257,55 @@ def _frame_that_claims(size: int) -> kinds.Chunk:
     return bomb
 
 
-@ANY
-@given(
-    st.permutations([SCHEMA, channel(1), channel(2, "/y"), *map(message, range(4)), message(4, 2)])
+EVIL = "/../../x\x1b[2J\n\r\u202e<script>alert(1)</script>|`$(touch pwned)`"
+
+
+def test_names_are_shown_without_what_a_terminal_obeys(tmp_path) -> None:
+    shown = printable(EVIL)
+    assert shown.isprintable() and "\\x1b[2J\\n\\r\\u202e<script>" in shown
+    assert printable("/ft/wrench_é") == "/ft/wrench_é"
+    assert shortened("a" * 50, 10) == "aaaaaaa..."
+    file = read(tmp_path, chunk([replace(SCHEMA, name=EVIL), channel(topic=EVIL), message(0)]))
+    assert file.topics[0].name == shown and file.topics[0].schema.name.isprintable()
+
+
+@pytest.mark.parametrize("name", [EVIL, "y" * 10**6])
+def test_no_name_reaches_an_error_as_it_is(tmp_path, name) -> None:
+    """Control characters, or a million of them."""
+    setup = load(DEFAULTS).setup
+    pose = replace(SCHEMA, name=f"{name}/msg/PoseStamped")
+    read(tmp_path, chunk([pose, channel(topic=name), message(0)]))
+    with pytest.raises(UserError) as caught:
+        read_recording(tmp_path / "file.mcap", setup)
+    assert str(caught.value).isprintable() and len(str(caught.value)) < 2000
+
+
+def test_a_frame_of_control_characters_is_made_printable(tmp_path, params) -> None:
+    def change(kind, stamp, message):
+        if kind in ("pose", "wrench"):
+            message.header.frame_id = EVIL
+        return message
+
+    recording = read_recording(blind_bag(tmp_path, change=change), params.setup)
+    assert recording.pose.frame.isprintable()
+
+
+@pytest.mark.parametrize(
+    "first, message",
+    [
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:0", "git lfs pull"),
+        (b"#ROSBAG V2.0\n", "a damaged ROS 1 bag"),
+        (b"SQLite format 3\0", "is no ROS 2 bag, or a damaged one"),
+        (b"PK\x03\x04", "ZIP"),
+        (bytes(50), "not an MCAP file"),
+        (gzip.compress(MAGIC, mtime=0), "packed by gzip: unpack it"),
+        (zstandard.compress(MAGIC), "packed by zstd: unpack it"),
+        (lz4.frame.compress(MAGIC), "packed by LZ4: unpack it"),
+    ],
 )
-def test_any_order_of_intact_records(tmp_path, stream) -> None:
-    file = read(tmp_path, *(chunk([record]) for record in stream))
-    assert file.losses == []
-    assert sorted(times(file)) == [0, 1, 2, 3] and times(file, "/y") == [4]
+def test_what_else_it_is(tmp_path, first, message) -> None:
+    path = tmp_path / "my.mcap"
+    path.write_bytes(first)
+    with pytest.raises(UserError, match="my.mcap: ") as caught:
+        read_container(path)
+    assert message in str(caught.value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,10 +13,12 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording import messages
+from sling2sim2real.recording.build import build_episodes
 from sling2sim2real.recording.files import read_container
 from sling2sim2real.recording.frames import geometry_of
 from sling2sim2real.recording.streams import read_recording, recording_of
-from validation.recordings.bag import START, blind_bag, edit, head
+from validation.recordings.bag import START, blind_bag, edit, head, messages_of
 
 
 def read(path: Path, params):
@@ -43,6 +46,25 @@ def test_what_another_library_decodes_is_what_we_read(blind, params) -> None:
     }
     assert recording.losses == []
     assert recording.gripper.values[0, 0] == pytest.approx(0.08)
+
+
+def test_each_message_is_decoded_once(seen, params, monkeypatch) -> None:
+    """From the file to its episode."""
+    decoded: Counter[str] = Counter()
+    make = messages.decoder
+
+    def counting(schema, encoding):
+        decode = make(schema, encoding)
+
+        def counted(payload: bytes):
+            decoded[schema.name] += 1
+            return decode(payload)
+
+        return counted
+
+    monkeypatch.setattr(messages, "decoder", counting)
+    build_episodes(seen[0], "band1", params)
+    assert decoded == Counter(schema.name for schema, *_ in messages_of(seen[0]))
 
 
 def test_a_lone_wild_value_is_lost_and_a_knock_is_kept(tmp_path, params) -> None:
@@ -127,9 +149,9 @@ def test_a_missing_topic_is_named(params, blind) -> None:
         ("compressedDepth", "no depth images"),
         ("camera_info", "no camera info"),
     ):
-        left = [channel for channel in container.channels if part not in channel.topic]
+        left = [topic for topic in container.topics if part not in topic.name]
         with pytest.raises(UserError, match=words) as caught:
-            recording_of(replace(container, channels=left), params.setup)
+            recording_of(replace(container, topics=left), params.setup)
         assert str(blind[0]) in str(caught.value) and "\n" not in str(caught.value)
 
 

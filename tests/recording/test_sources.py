@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording import kinematics, messages
-from sling2sim2real.recording.messages import READERS, Channel, Unreadable
+from sling2sim2real.recording.messages import Topic, Unreadable
+from sling2sim2real.recording.topics import _all
 from tests.recording.messages import (
     COUNT,
     FORCE,
@@ -64,7 +66,10 @@ def test_an_odometry_and_one_pose_of_several(params) -> None:
         frame, values = played(chosen(params, wrench("/ft"), channel("/hand", kind, sent))["pose"])
         assert frame == "base"
         assert_poses(values)
-    assert chosen(params, wrench("/ft"), pose("/a"), channel("/ee", kind, sent))["pose"].channel
+    assert (
+        chosen(params, wrench("/ft"), pose("/a"), channel("/ee", kind, sent))["pose"].topic.name
+        == "/a"
+    )
     several = [{**message, "poses": 2 * message["poses"]} for message in poses]
     with pytest.raises(UserError, match="/hand has fewer than two readable messages"):
         chosen(params, wrench("/ft"), channel("/hand", "foxglove.PosesInFrame", several))
@@ -99,7 +104,7 @@ def test_a_hand_that_is_in_tf_alone(params) -> None:
     ]
     choice = chosen(params, wrench("/ft"), *topics)["pose"]
     frame, values = played(choice)
-    assert frame == "base" and choice.channel.topic == "/tf"
+    assert frame == "base" and choice.topic.name == "/tf"
     np.testing.assert_allclose(values[:, :3], PLACES + TURNS.apply([0.0, 0.0, 0.1]), atol=1e-9)
     named = chosen(params, wrench("/ft"), *topics, tip_link="link1")["pose"]
     np.testing.assert_allclose(played(named)[1][:, :3], np.tile(place, (COUNT, 1)), atol=1e-9)
@@ -108,20 +113,20 @@ def test_a_hand_that_is_in_tf_alone(params) -> None:
 
 
 def test_a_type_is_added_in_one_place(params, monkeypatch) -> None:
-    """What is in the table is kept when a file is read, chosen, and read as it says."""
-    monkeypatch.setitem(messages.READERS, "pose", {**READERS["pose"], "Hand": messages.read_pose})
-    assert messages.is_read("my_msgs/msg/Hand") and not messages.is_read("my_msgs/msg/Other")
+    """What is in the table is read, and chosen."""
     sent = [{**head(k), "pose": pose_fields(POSES[k])} for k in range(COUNT)]
+    assert channel("/h", "a/Hand", sent).readings == {}
+    monkeypatch.setitem(messages.TYPES, "Hand", {"pose": messages.read_pose})
     assert_poses(played(chosen(params, wrench("/ft"), channel("/h", "a/Hand", sent))["pose"])[1])
 
 
-def robot_state(topic: str = "/franka_robot_state_broadcaster/robot_state") -> Channel:
+def robot_state(topic: str = "/franka_robot_state_broadcaster/robot_state") -> Topic:
     """FrankaRobotState in CDR by mcap-ros2-support; some of its fields."""
     store = get_typestore(Stores.ROS2_HUMBLE)
     store.register(get_types_from_msg(STATE_FIELDS, STATE))
     text = store.generate_msgdef(STATE, ros_version=2)[0]
     encode = serialize_dynamic(STATE, text)[STATE]
-    payloads = []
+    sent = Topic.of(topic, Schema(1, text.encode(), "ros2msg", STATE), "cdr")
     for k in range(COUNT):
         message = {
             **head(k, "link0"),
@@ -131,9 +136,8 @@ def robot_state(topic: str = "/franka_robot_state_broadcaster/robot_state") -> C
             "robot_mode": 2,
         }
         message["measured_joint_state"].update(velocity=[], effort=[])
-        payloads.append(encode(_named(message)))
-    times = [5_000_000_000 + round(1e9 * t) for t in TIMES]
-    return Channel(topic, Schema(1, text.encode(), "ros2msg", STATE), "cdr", times, payloads)
+        sent.add(5_000_000_000 + round(1e9 * TIMES[k]), encode(_named(message)))
+    return sent
 
 
 def _named(value: object) -> object:
@@ -153,10 +157,10 @@ def test_a_franka_robot_state_is_pose_and_for_lack_of_a_sensor_force(params) -> 
     assert roles["wrench"].why == "the only FrankaRobotState for force"
 
     with_sensor = chosen(params, robot_state(), wrench("/external_wrench"))
-    assert with_sensor["wrench"].channel.topic == "/external_wrench"
+    assert with_sensor["wrench"].topic.name == "/external_wrench"
     name = "/franka_robot_state_broadcaster/robot_state"
     named = chosen(params, robot_state(), wrench("/ft"), topics={"wrench": name})
-    assert named["wrench"].channel.topic == name
+    assert named["wrench"].topic.name == name
     assert named["wrench"].why == "setup.topics.wrench"
 
 
@@ -208,30 +212,31 @@ def test_joint_states_through_a_urdf(params, gantry) -> None:
     gripper = joints("/gripper/joint_states", ["finger_joint1"], gantry[:, :1])
     roles = chosen(params, wrench("/ft"), gripper, arm, urdf="gantry.urdf")
     frame, values = played(roles["pose"])
-    assert frame == "bench" and roles["pose"].channel.topic == "/joint_states"
+    assert frame == "bench" and roles["pose"].topic.name == "/joint_states"
     assert_poses(values)
-    assert roles["gripper"].channel.topic == "/gripper/joint_states"
+    assert roles["gripper"].topic.name == "/gripper/joint_states"
 
     alone = chosen(params, wrench("/ft"), arm, urdf="gantry.urdf")
     np.testing.assert_array_equal(played(alone["gripper"])[1], [[0.02]] * COUNT)
     measured = chosen(params, wrench("/ft"), arm, pose(), urdf="gantry.urdf")
-    assert measured["pose"].channel.topic == "/arm/current_pose"
+    assert measured["pose"].topic.name == "/arm/current_pose"
 
 
 def test_arm_and_gripper_that_share_a_topic(params, gantry) -> None:
-    """Each is read from its own messages; the other's raise, for the caller to leave out."""
+    """Each is read from its own messages; one that lacks some of its joints is damaged."""
     arm = joints("/joint_states", [name for name, *_ in GANTRY], gantry)
     fingers = joints("/joint_states", ["left_finger", "right_finger"], gantry[:, :2])
-    both = [
-        message for pair in zip(fingers.payloads, arm.payloads, strict=True) for message in pair
-    ]
-    shared = Channel("/joint_states", arm.schema, "json", sorted(arm.log_times * 2), both)
+    shared = replace(arm, log_times=[], readings={"joints": []})
+    for one in zip(*(_all(topic, "joints") for topic in (fingers, arm)), strict=True):
+        for time, reading in one:
+            shared.log_times.append(time)
+            shared.readings["joints"].append(reading)
+    shared.readings["joints"][0].value.pop("left_finger")
     roles = chosen(params, wrench("/ft"), shared, urdf="gantry.urdf")
-    assert len(roles["pose"].read(both[1]).value) == 6
-    assert roles["gripper"].read(both[0]).value == tuple(gantry[0, :2])
-    for role, payload in (("pose", both[0]), ("gripper", both[1])):
-        with pytest.raises(Unreadable, match="is missing"):
-            roles[role].read(payload)
+    pose, gripper = (roles[role].messages for role in ("pose", "gripper"))
+    assert len(pose) == len(gripper) == COUNT and len(pose[0][1].value) == 6
+    assert gripper[1][1].value == tuple(gantry[1, :2])
+    assert isinstance(gripper[0][1], Unreadable) and gripper[0][1] == "joint left_finger is missing"
 
 
 @pytest.mark.parametrize(

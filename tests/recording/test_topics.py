@@ -9,7 +9,7 @@ import pytest
 from mcap.records import Schema
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.messages import Channel
+from sling2sim2real.recording.messages import Topic
 from sling2sim2real.recording.topics import camera_of
 from tests.recording.messages import (
     CAMERA,
@@ -37,11 +37,11 @@ def test_the_measured_one_of_several(params) -> None:
         pose("/arm/ee_pose"),
         pose("/object"),
     )
-    assert roles["wrench"].channel.topic == "/ft_sensor/wrench"
+    assert roles["wrench"].topic.name == "/ft_sensor/wrench"
     assert roles["wrench"].why == (
         "of 4 topics: named ft wrench, 1000 Hz; not /arm/external_wrench, /battery/ft_force"
     )
-    assert roles["pose"].channel.topic == "/arm/ee_pose"
+    assert roles["pose"].topic.name == "/arm/ee_pose"
     assert roles["color"].why == "the only Image for colour images"
     assert list(roles) == ["wrench", "pose", "color", "depth", "color_info", "depth_info"]
 
@@ -60,12 +60,12 @@ def test_where_several_topics_would_do_one_line_lists_them(params) -> None:
     assert str(caught.value) == words
     topics = {"wrench": "/right/wrench", "pose": "/right/pose"}
     roles = chosen(params, *arms, topics=topics)
-    assert {role: roles[role].channel.topic for role in topics} == topics
+    assert {role: roles[role].topic.name for role in topics} == topics
     webcam = picture("/webcam/rgb", "rgb8", "webcam"), info("/webcam/camera_info", "webcam")
     one_arm = wrench("/ft"), pose()
     with pytest.raises(UserError, match="setup.topics.color /cam/color/image, /webcam/rgb: name"):
         chosen(params, *one_arm, *webcam)
-    packed = replace(CAMERA[0], topic="/cam/color/image/compressed")  # one picture, sent twice
+    packed = replace(CAMERA[0], name="/cam/color/image/compressed")  # one picture, sent twice
     assert "color" in chosen(params, *one_arm, packed)
 
 
@@ -109,7 +109,7 @@ def test_the_topics_of_a_realsense(params) -> None:
         )
     ]
     roles = chosen(params, wrench("/ft300/wrench"), pose(), camera=camera)
-    assert {role: choice.channel.topic for role, choice in roles.items()} == {
+    assert {role: choice.topic.name for role, choice in roles.items()} == {
         "wrench": "/ft300/wrench",
         "pose": "/arm/current_pose",
         "color": "/cam/color/image_raw",
@@ -122,7 +122,7 @@ def test_the_topics_of_a_realsense(params) -> None:
 # Camera infos
 
 
-def cameras(params, *channels: Channel, **topics: str):
+def cameras(params, *channels: Topic, **topics: str):
     roles = chosen(params, wrench("/ft"), pose(), camera=channels, topics=topics)
     focals = [camera_of(roles, role).matrix[0, 0] for role in ("color", "depth")]
     return roles, focals
@@ -144,12 +144,15 @@ def test_each_camera_has_its_own_info(params) -> None:
 
 def test_a_damaged_first_message_does_not_decide(params) -> None:
     color, color_info, depth, depth_info = CAMERA
-    bad_info, bad_depth = (
-        replace(channel, payloads=list(channel.payloads)) for channel in (depth_info, depth)
-    )
-    bad_info.payloads = [depth_info.payloads[0].replace(b"40.0", b"-4.0"), *depth_info.payloads * 2]
-    bad_depth.payloads[0] = depth.payloads[0].replace(b"16UC1", b"16QC1")
-    bad_info.log_times = [0] * len(bad_info.payloads)
+    bad_info = info("/cam/depth/camera_info", "depth", -4.0)
+    for k in range(3):
+        bad_info.log_times.append(k)
+        bad_info.readings["info"] += depth_info.readings["info"]
+    bad_info.readings["info"] = bad_info.readings["info"][1:6]
+    bad_info.log_times = [0] * 5
+    first, *others = depth.readings["picture"]
+    first = first._replace(value=replace(first.value, encoding="16QC1"))
+    bad_depth = replace(depth, readings={"picture": [first, *others]})
     assert cameras(params, color, color_info, bad_depth, bad_info)[1] == [50, 40]
 
 
@@ -221,7 +224,8 @@ def test_named_topics_that_will_not_do(params, topics, words) -> None:
 
 
 def test_json_without_a_schema_is_called_so(params) -> None:
-    bare = Channel("/ft", Schema(0, b"", "", ""), "json", [1], [b"{}"])
+    bare = Topic.of("/ft", Schema(0, b"", "", ""), "json")
+    bare.add(1, b"{}")
     with pytest.raises(UserError, match="the file has .*/ft .json topic without a schema"):
         chosen(params, bare, pose())
     with pytest.raises(UserError, match="/ft is a json topic without a schema, not WrenchSt"):
@@ -229,9 +233,8 @@ def test_json_without_a_schema_is_called_so(params) -> None:
 
 
 def test_a_topic_in_an_unknown_encoding_is_named_if_nothing_else_will_do(params) -> None:
-    other = Channel(
-        "/ft", Schema(1, b"", "flatbuffer", "lab.WrenchStamped"), "flatbuffer", [1], [b""]
-    )
+    other = Topic.of("/ft", Schema(1, b"", "flatbuffer", "lab.WrenchStamped"), "flatbuffer")
+    other.add(1, b"")
     with pytest.raises(UserError, match="no force.*topic /ft: schema 'flatbuffer'"):
         chosen(params, other, pose())
-    assert chosen(params, other, wrench("/ft2"), pose())["wrench"].channel.topic == "/ft2"
+    assert chosen(params, other, wrench("/ft2"), pose())["wrench"].topic.name == "/ft2"

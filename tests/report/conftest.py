@@ -10,8 +10,8 @@ import pytest
 
 from pipeline.params import load
 from pipeline.report import report as reporting
-from pipeline.report import write as writing
-from pipeline.report.results import Result, Results, gather
+from pipeline.report.data import Result, gather
+from pipeline.report.figures import search, simulation
 from sling2sim2real.base.launches_file import write_launches
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.searches.regions import Region, save_regions
@@ -19,7 +19,7 @@ from sling2sim2real.simulator.parameters import THETA as NAMES
 from tests.policy.stored import write_stored
 from tests.project import DEFAULTS, write_params_of
 from tests.report import toy_launches
-from tests.report.toy_replay import toy_landscape, toy_replay
+from tests.report.toy_simulation import toy_landscape, toy_replay
 
 BAND, METHOD = "toy", "paper"
 PAIR = f"{BAND}-{METHOD}"
@@ -124,7 +124,7 @@ def template(tmp_path_factory) -> Path:
     evaluations.to_parquet(data / "evaluations" / f"{PAIR}.parquet")
     write_launches(data / "launches" / f"{BAND}.csv", [])
     region = Region(np.full(5, 0.4), 0.01 * np.eye(5), 2.0, [2, 0])
-    save_regions(data / "clusters" / f"{PAIR}.json", NAMES, [region], 5)
+    save_regions(data / "clusters" / f"{PAIR}.json", NAMES, [region])
     loss = {"geom": 0.5, "force": 0.25, "work": 0.5, "total": 1.25}
     theta = {"band": BAND, "method": METHOD, "theta": THETA, "loss": loss, "rollouts": 5}
     theta["confidence"] = confidence()
@@ -149,16 +149,16 @@ def root(template: Path, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def no_simulation(monkeypatch) -> None:
-    monkeypatch.setattr(reporting, "replay_method", toy_replay)
-    monkeypatch.setattr(reporting, "landscape", toy_landscape)
+    monkeypatch.setattr(simulation, "replayed", toy_replay)
+    monkeypatch.setattr(search, "landscape", toy_landscape)
 
 
 @pytest.fixture
 def text_alone(monkeypatch) -> None:
     """Pictures and the page take seconds, and tell a test of the text nothing."""
     shown = lambda _, name, alt, *__: f"![{alt}](figures/{name}.png)\n"  # noqa: E731
-    monkeypatch.setattr(reporting.Report, "picture", shown)
-    monkeypatch.setattr(writing, "write_page", lambda *_: None)
+    monkeypatch.setattr(reporting.Report, "_picture", shown)
+    monkeypatch.setattr(reporting, "write_page", lambda *_: None)
 
 
 @pytest.fixture
@@ -167,10 +167,5 @@ def params(root: Path):
 
 
 @pytest.fixture
-def results(root: Path, params) -> Results:
-    return gather(params, root)
-
-
-@pytest.fixture
-def result(results: Results) -> Result:
-    return results.methods[BAND][METHOD]
+def result(root: Path, params) -> Result:
+    return gather(params, root).results[BAND][METHOD]

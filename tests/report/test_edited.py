@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from pipeline.report import write as writing
+from pipeline.report.report import write
 from tests.edited import outcomes
 from tests.report.conftest import PAIR
 
@@ -21,5 +21,5 @@ FILES = {
 def test_any_edit_is_one_line_or_a_report(name, root, params, no_simulation, text_alone) -> None:
     path = root / FILES[name]
     content = json.loads(path.read_text())
-    accepted, refused = outcomes(path, content, lambda: writing.write(params, root))
+    accepted, refused = outcomes(path, content, lambda: write(params, root))
     assert refused > accepted > 0

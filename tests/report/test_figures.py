@@ -1,19 +1,23 @@
 """Pictures of the report, read back from the objects that were drawn."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.patches import Ellipse
+from hypothesis import given
+from hypothesis import strategies as st
 
-from pipeline.report.figures import confidence, landings, policy, search
-from pipeline.report.figures.pull import pull
+from pipeline.report.data import with_errors
+from pipeline.report.figures import landings, search
+from pipeline.report.figures.simulation import pull
 from sling2sim2real.drawing import canvas
 from sling2sim2real.drawing.styles import styles
+from sling2sim2real.identification.results.ranges import searched
 from tests.report.conftest import BAND, METHOD, episode, launches
-from tests.report.toy_replay import toy_replay
+from tests.report.toy_simulation import toy_landscape, toy_replay
 
 
 @pytest.fixture
@@ -26,13 +30,13 @@ def retained(monkeypatch) -> list[plt.Figure]:
 
 
 METHODS = [METHOD, "de"]
-ERRORS = 100 * (np.array([1.725, 1.725, 1.925]) / [1.745, 1.695, 1.965] - 1)  # % of the three
 
 
 def trials() -> pd.DataFrame:
     """Two methods on one band, the first also on another, where nothing lands."""
     far = launches().assign(band="far", landing_y=np.nan, failure="too far")
-    return pd.concat([launches(), launches().assign(method="de", kind="virtual"), far])
+    both = launches(), launches().assign(method="de", kind="virtual")
+    return with_errors(pd.concat([*both, far]))
 
 
 def dots(ax) -> dict[int, list[float]]:
@@ -69,7 +73,7 @@ def test_every_launch_lies_as_far_off_as_it_landed(retained) -> None:
 
 def test_a_landing_outside_the_area_is_a_failure_and_no_dot(retained) -> None:
     outside = launches().assign(landing_y=[1.745, 1.0, 1.965, 2.6])
-    landings.misses("", outside, {}, styles([METHOD]))
+    landings.misses("", with_errors(outside), {}, styles([METHOD]))
     (ax,) = retained[0].axes
     np.testing.assert_allclose(sorted(dots(ax)[0]), [2, 4])
     assert [text.get_text() for text in ax.texts] == ["2 of 4 failed"]
@@ -79,24 +83,9 @@ def test_a_landing_outside_the_area_is_a_failure_and_no_dot(retained) -> None:
 def test_what_is_far_off_lies_on_a_logarithmic_axis_that_says_so(retained) -> None:
     for off, words in ((0.05, ""), (0.2, ", logarithmic beyond ± 10")):
         trials = launches()
-        landings.misses("", trials.assign(landing_y=trials.target + off), {}, styles([METHOD]))
+        trials = with_errors(trials.assign(landing_y=trials.target + off))
+        landings.misses("", trials, {}, styles([METHOD]))
         assert retained[-1].axes[0].get_xlabel() == f"landing − target [cm]{words}"
-
-
-def test_predictions_lie_in_intervals_that_are_called_what_they_are(retained) -> None:
-    landings.predictions("", trials(), {(BAND, METHOD)}, styles(METHODS))
-    (ax,) = retained[0].axes  # nothing landed on the other band
-    for row in dots(ax).values():
-        np.testing.assert_allclose(sorted(row), sorted(ERRORS))
-    lines = [collection for collection in ax.collections if hasattr(collection, "get_segments")]
-    solid, dotted = (line.get_linestyle()[0][1] for line in lines)
-    assert solid is None and dotted is not None
-    ends = np.array([segment[:, 0] for segment in lines[0].get_segments()])
-    widths = 100 * 0.05 / np.array([1.695, 1.745, 1.965])
-    np.testing.assert_allclose(ends[:, 1] - ends[:, 0], widths)
-    assert {"90 % interval", "90 % by the draw's error alone"} <= set(words(retained[0]))
-    landings.predictions("", launches(), {(BAND, METHOD)}, styles([METHOD]))
-    assert "90 % by the draw's error alone" not in words(retained[1])
 
 
 STILL = episode()
@@ -107,7 +96,8 @@ SIZE = np.hypot(STILL.time, np.sin(STILL.time))
 
 
 def test_force_over_draw_and_what_is_left_over_time(retained) -> None:
-    played = toy_replay(None, None, RECORDED, {}, None)
+    run = SimpleNamespace(episodes={BAND: RECORDED})
+    played = toy_replay(run, SimpleNamespace(band=BAND))
     pull("", {BAND: RECORDED}, {BAND: {METHOD: played}}, styles([METHOD]))
     top, middle, bottom = retained[0].axes
     measured, simulated = top.lines
@@ -125,10 +115,6 @@ def test_a_recording_alone_is_drawn_too(retained) -> None:
     assert [text.get_text() for text in retained[0].legends[0].get_texts()] == ["measured"]
 
 
-def pairs(figure: plt.Figure) -> list[plt.Axes]:
-    return [ax for ax in figure.axes if ax.get_xlim() == ax.get_ylim() == (0, 1)]
-
-
 def test_convergence_draws_the_printed_loss_of_the_best_so_far(retained, result) -> None:
     """Of a fit that keeps one row, that row stands where its rollouts end."""
     fitted = replace(result, theta=result.theta | {"rollouts": 60})
@@ -143,84 +129,71 @@ def test_convergence_draws_the_printed_loss_of_the_best_so_far(retained, result)
     assert steps.get_linestyle() != other.get_linestyle()
 
 
-def test_the_corner_shows_every_pair_of_parameters(retained, result, params) -> None:
-    search.corner("", result, params.parameters, "x")
-    assert len(pairs(retained[0])) == 5 * 4 / 2
-    for ax in pairs(retained[0]):
-        points = ax.collections[0].get_offsets()
-        assert len(points) == 4  # the failed one is a cross
-        crosses = [line for line in ax.lines if line.get_marker() == "x"]
-        np.testing.assert_allclose(crosses[0].get_xdata(), [0.5])
-        star = next(line for line in ax.lines if line.get_marker() == "*")
-        np.testing.assert_allclose([star.get_xdata()[0], star.get_ydata()[0]], 0.75)
-        (ellipse,) = (patch for patch in ax.patches if isinstance(patch, Ellipse))
-        np.testing.assert_allclose(ellipse.center, 0.4)
-        np.testing.assert_allclose([ellipse.width, ellipse.height], 0.2)  # twice a deviation
-        way = next(line for line in ax.lines if line.get_color() == search.PATH)
-        np.testing.assert_allclose(way.get_xdata(), [0.4, 0.25, 0.75])  # centre, two iterations
-
-
-def test_an_ellipse_lies_along_its_covariance(retained, result, params) -> None:
+def test_the_search_is_drawn_in_physical_values(retained, result, params) -> None:
+    """Failures are crosses, a region is an ellipse along its covariance, its path starts there."""
     sigma = 0.01 * np.eye(5)
-    sigma[0, 1] = sigma[1, 0] = 0.009
+    sigma[0, 2] = sigma[2, 0] = 0.009  # E and d
     result.regions[0].sigma[:] = sigma
-    search.corner("", result, params.parameters, "x")
-    first = pairs(retained[0])[0]
-    (ellipse,) = (patch for patch in first.patches if isinstance(patch, Ellipse))
-    assert ellipse.angle % 180 == pytest.approx(45)
-    assert ellipse.width == pytest.approx(2 * np.sqrt(0.019))
-    assert ellipse.height == pytest.approx(2 * np.sqrt(0.001))
+    ranges, chart = searched(params, METHOD), toy_landscape(None, result)
+    search.search("", result, chart, ranges)
+    _, second, third, _ = retained[0].axes
+    assert len(second.collections[-1].get_offsets()) == 2  # of three; one failed
+    modulus, damping = ranges["youngs_modulus"], ranges["elasticity_damping"]
 
+    def at(place: float) -> list[float]:
+        return [1e-3 * modulus.at(place), 1e3 * damping.at(place)]
 
-def test_axes_that_are_held_fixed_are_left_out(retained, result, params) -> None:
-    for name in ("poissons_ratio", "elasticity_damping", "damping_scale"):
-        result.evaluations[f"unit_{name}"] = 0.5
-    search.corner("", result, params.parameters, "x")
-    assert len(pairs(retained[0])) == 1
-
-
-def test_ticks_stand_at_round_physical_values(retained, result, params) -> None:
-    search.corner("", result, params.parameters, "x")
-    ax = next(ax for ax in retained[0].axes if ax.get_xlabel() == "d [ms]")
-    box = params.parameters.elasticity_damping
-    for place, label in zip(ax.get_xticks(), ax.get_xticklabels(), strict=True):
-        seconds = box.low * (box.high / box.low) ** place
-        assert 1e3 * seconds == pytest.approx(float(label.get_text()))
-    assert [label.get_text() for label in ax.get_xticklabels()] == ["1", "10"]
-
-
-def test_the_map_shows_the_path_of_the_policy_and_what_lies_about_it(retained, result) -> None:
-    targets, path = np.array([1.725, 2.125]), np.array([[-0.30, -0.14], [-0.34, -0.13]])
-    chart, other = result.landing_map, "other"
-    policy.landing_maps(
-        "", {BAND: chart, other: chart}, {BAND: path, other: path}, targets,
-        {BAND: 1.63, other: 1.63}, 0.275, {BAND: 0.52, other: 0.52},
-    )  # fmt: skip
-    first, _, bar = retained[0].axes
-    line, dot = first.lines
-    np.testing.assert_array_equal(np.transpose(line.get_data()), path)
-    np.testing.assert_array_equal([dot.get_xdata()[0], dot.get_ydata()[0]], path[0])
-    low, high = first.get_xlim()
-    assert max(chart.draw_y[0], -0.34 - policy.AROUND) == low and high < 0
-    y, z, landing = policy._fine(chart, path.min(0) - policy.AROUND, path.max(0) + policy.AROUND)
-    assert bar.get_ylim()[0] <= np.nanmin(landing) and np.nanmax(landing) <= bar.get_ylim()[1]
-    np.testing.assert_allclose(landing[3, 5], chart(np.array([[y[3, 5], z[3, 5]]])).landing_y[0])
+    crosses, ellipse, path, _, star = third.lines
+    np.testing.assert_allclose(np.ravel(crosses.get_data()), at(0.5))
+    np.testing.assert_allclose(np.ravel(star.get_data()), at(0.75))
+    np.testing.assert_allclose(np.transpose(path.get_data()), [at(0.4), at(0.25), at(0.75)])
+    x, y = ellipse.get_data()
+    places = np.log(np.array([x / x.min(), y / y.min()])) / np.log([[1e7 / 3e4], [500]])
+    np.testing.assert_allclose(np.ptp(places, axis=1), 0.2, rtol=2e-3)  # twice a deviation
+    assert np.corrcoef(places)[0, 1] == pytest.approx(0.9, abs=0.02)
 
 
 def test_training_is_drawn_in_centimetres(retained, result) -> None:
     curves = {BAND: {METHOD: result.training, "de": result.training}}
-    policy.training("", curves, styles([METHOD, "de"]))
+    search.training("", curves, styles([METHOD, "de"]))
     first, second, _ = retained[0].axes[0].lines
     np.testing.assert_array_equal(first.get_xdata(), [1, 2])
     np.testing.assert_allclose(first.get_ydata(), [30, 0.4])
     assert first.get_linestyle() != second.get_linestyle()
 
 
-def test_correlations_are_written_into_half_of_their_cells(retained, result) -> None:
-    confidence.correlation("", {BAND: result.confidence, "other": result.confidence})
-    first, second, _ = retained[0].axes
-    assert (first.get_title(), second.get_title()) == (BAND, "other")
-    (image,) = first.images
-    np.testing.assert_array_equal(image.get_array(), result.confidence["correlation"]["matrix"])
-    assert [(t.get_position(), t.get_text()) for t in first.texts] == [((0, 1), "−0.9")]
-    assert METHOD not in first.get_title()
+def test_flights_lie_where_they_flew_and_were_expected(retained, params) -> None:
+    """A launch without air from 0.5 m above the floor, at 45 degrees and 3 m/s."""
+    flown = {"flight_y": [[0.0, 1.0, 2.0]] * 4, "flight_z": [[0.0, 0.4, -0.5]] * 4}
+    begun = {"predicted_leave_y": 0.0, "predicted_leave_z": 0.0, "predicted_speed": 3.0}
+    trials = launches().assign(kind="virtual", predicted_angle=np.pi / 4, **begun, **flown)
+    trials.loc[3, "flight_y"] = None
+    landings.flights("", with_errors(trials), params.setup, styles([METHOD]))
+    (ax,) = retained[0].axes
+    curves = [line for line in ax.lines if len(line.get_xdata()) == 3]
+    assert len(curves) == 3 and ax.get_title() == "paper (3 of 4 flew)"
+    np.testing.assert_array_equal(curves[0].get_xydata(), np.transpose([[0, 1, 2], [0, 0.4, -0.5]]))
+    expected = next(line for line in ax.lines if line.get_linestyle() == "--")
+    far = expected.get_xydata()[-1]
+    speed, height = 3 / np.sqrt(2), params.setup.fork_height
+    time = (speed + np.sqrt(speed**2 + 2 * 9.81 * height)) / 9.81
+    np.testing.assert_allclose(far, [speed * time, -height], rtol=1e-3)
+
+
+def rows(total, geom, force=0.0, work=0.0) -> pd.DataFrame:
+    columns = np.broadcast_arrays(total, geom, force, work)
+    return pd.DataFrame(dict(zip(("total", "geom", "force", "work"), columns, strict=True)))
+
+
+def test_the_best_by_another_loss_may_print_worse() -> None:
+    history = rows([np.inf, 3, 5, 2, 2, 1], [np.nan, 1, 0.5, 4, 9, 2], force=0.5, work=0.25)
+    best = search.best_so_far(history)
+    assert best.tolist() == [0, 1, 1, 3, 3, 5]  # among equals the first
+    printed = search.printed(history)[best]
+    np.testing.assert_allclose(printed, [np.inf, 1.75, 1.75, 4.75, 4.75, 2.75])
+
+
+@given(st.lists(st.floats(0, 9) | st.just(np.inf), min_size=1, max_size=40))
+def test_the_methods_own_best_never_rises(total: list[float]) -> None:
+    best = np.array(total)[search.best_so_far(rows(total, 0.0))]
+    np.testing.assert_array_equal(best, np.minimum.accumulate(total))

@@ -1,6 +1,7 @@
 """The replay against the rollout that it filters and samples."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from scipy.interpolate import PchipInterpolator
 
 from pipeline.layout import Layout
 from pipeline.params import load
-from pipeline.report.replay import replay_method
+from pipeline.report.figures.simulation import replayed
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.simulator.interaction import interact
@@ -53,12 +54,10 @@ def recorded(sling):
 @pytest.fixture(scope="module")
 def played(params, recorded):
     episode, rollouts = recorded
-    theta = {"theta": THETA}
-    return (
-        episode,
-        rollouts,
-        replay_method(params, params.run.pairs[f"band1-{METHOD}"], episode, theta, Layout()),
-    )
+    pair = params.run.pairs[f"band1-{METHOD}"]
+    result = SimpleNamespace(band="band1", method=METHOD, theta={"theta": THETA}, pair=pair)
+    run = SimpleNamespace(params=params, episodes={"band1": episode}, layout=Layout())
+    return episode, rollouts, replayed(run, result)
 
 
 def test_the_pause_keeps_the_force_and_nothing_pulls_before_or_after(played) -> None:

@@ -94,7 +94,7 @@ def write_run(root: Path) -> None:
             trials.assign(band=band, method=method).to_parquet(layout.trials(pair))
             layout.theta(pair).write_text(json.dumps(theta(band, method)))
     regions = [Region(np.full(5, 0.4), 0.01 * np.eye(5), total, [2, 0]) for total in (2.0, 2.5)]
-    save_regions(layout.clusters(pairs[f"band2-{METHOD}"]), NAMES, regions, 5)
+    save_regions(layout.clusters(pairs[f"band2-{METHOD}"]), NAMES, regions)
     file = layout.policy(pairs[f"band2-{OURS}"]) / "card.json"
     card = json.loads(file.read_text())
     card["training"] |= {"converged": False, "failed_targets": 2}

@@ -76,7 +76,7 @@ def test_gpus_share_a_batch_and_change_nothing(
     clouds = [np.random.default_rng(frame).normal(0, 0.1, (200, 3)) for frame in range(len(time))]
     seen = replace(episode, clouds=[cloud.astype(np.float32) for cloud in clouds])
     weights = {"geom": 1.0, "force": 1.0, "work": 1.0}
-    shape = {"radius": sling.radius, "rest_length": sling.edge_lengths}
+    shape = {"radius": sling.radius, "rest_edges": sling.edge_lengths}
     loss = EpisodeLoss(seen, **shape, weights=weights, cutoff=30.0)
     space = SearchBox.of(load(DEFAULTS).parameters)
     unit = np.random.default_rng(8).random((67, space.dimension))

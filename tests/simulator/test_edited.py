@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from pipeline.params import load
-from sling2sim2real.identification.results.mounting import load_sling
-from sling2sim2real.identification.results.theta import load_samples
+from sling2sim2real.identification.results.theta import load_samples, load_sling
 from sling2sim2real.simulator.parameters import Parameters
 from tests.edited import outcomes
 from tests.project import DEFAULTS

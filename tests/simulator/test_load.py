@@ -6,8 +6,13 @@ import pytest
 
 from pipeline.params import load
 from sling2sim2real.base.files import write_json
-from sling2sim2real.identification.results.mounting import load_sling, sling_of_method
-from sling2sim2real.identification.results.theta import calibrated, launch_setup, load_theta
+from sling2sim2real.identification.results.theta import (
+    calibrated,
+    launch_setup,
+    load_sling,
+    load_theta,
+    sling_of_method,
+)
 from sling2sim2real.simulator import launch
 from sling2sim2real.simulator.parameters import THETA, Parameters
 from tests.project import DEFAULTS

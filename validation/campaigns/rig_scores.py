@@ -18,7 +18,7 @@ from sling2sim2real.base.files import replacing, write_json
 from sling2sim2real.base.schema import read_json
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.clamps import calibrate_clamps
-from sling2sim2real.identification.results.mounting import Mounting
+from sling2sim2real.identification.results.theta import Mounting
 from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.launching.trials.spread import landing_intervals
 from sling2sim2real.simulator.model import ClampedBand

@@ -18,35 +18,33 @@ from sling2sim2real.drawing.canvas import key
 COLUMNS, WIDTH = 2, 5.6  # panels in a row; inches
 ENTRY = 2.6  # inches of an entry of a key
 LETTERS = 11.5  # of a title, an inch
+DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))  # of methods, one after another
 
 
 def panels(
-    bands: Iterable[str], title: str, tall: float, columns: int = COLUMNS, **more
+    names: Iterable[str], title: str, tall: float, columns: int = COLUMNS, **more
 ) -> tuple[Figure, dict[str, Axes]]:
-    """A figure with a panel a band.
+    """A figure with a panel a name.
 
     Args:
         tall: Height of a panel [inches].
         columns: Panels in a row, at most.
         more: For matplotlib's `subplots`.
-
-    Returns:
-        The figure, and its axes by band.
     """
-    bands = list(bands)
-    columns = min(len(bands), columns)
-    rows = -(-len(bands) // columns)
+    names = list(names)
+    columns = min(len(names), columns)
+    rows = -(-len(names) // columns)
     size = WIDTH, rows * tall + 0.9
     figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, **more)
-    for ax in axes.flat[len(bands) :]:
+    for ax in axes.flat[len(names) :]:
         ax.remove()
-    by_band = dict(zip(bands, axes.flat, strict=False))
-    for band, ax in by_band.items():
-        ax.set_title(band, fontsize=9)
-    for ax in axes.flat[len(bands) - columns : len(bands)]:  # the lowest of each column
+    by_name = dict(zip(names, axes.flat, strict=False))
+    for name, ax in by_name.items():
+        ax.set_title(name, fontsize=9)
+    for ax in axes.flat[len(names) - columns : len(names)]:  # the lowest of each column
         ax.tick_params(labelbottom=True)
     entitle(figure, title)
-    return figure, by_band
+    return figure, by_name
 
 
 def explain(figure: Figure, entries: Iterable[tuple[str, Artist]]) -> None:

@@ -1,34 +1,51 @@
-"""What the searches evaluated: convergence, and where in the unit cube."""
+"""How searches and policies converged, and figure 2 of the paper on the loss itself."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import cycle
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse
-from matplotlib.ticker import MaxNLocator
 
-from pipeline.report.figures.panels import entitle, explain, panels
-from pipeline.report.figures.policy import DASHES
-from pipeline.report.results import Result, best_so_far, printed
+from pipeline.report.data import PRINTED, Result, Run
+from pipeline.report.figures.panels import DASHES, entitle, explain, panels
 from sling2sim2real.drawing.canvas import few_ticks, key, log_y, mark, picture
 from sling2sim2real.drawing.styles import INK, Styles
+from sling2sim2real.identification.objective.box import SearchBox
+from sling2sim2real.identification.objective.evaluate import Evaluator
+from sling2sim2real.identification.objective.loss import EpisodeLoss
+from sling2sim2real.identification.results.ranges import SearchedRange
+from sling2sim2real.identification.results.theta import calibrated, parameters_of
+from sling2sim2real.identification.searches.regions import Region
 from sling2sim2real.quantities import QUANTITIES
-from sling2sim2real.settings.identification import ParameterBoxes
-from sling2sim2real.simulator.parameters import THETA
 
+AXES = "youngs_modulus", "elasticity_damping"  # two dominant factors, the paper says
+SIZE = 17  # rollouts along each axis
+AROUND = 0.04  # of the unit cube, about what is shown
 PATH, STAR = "#e4003a", "#ffd23f"
 NEAR = 0.5  # above the least loss, up to which a picture reaches at least
-EDGE = 0.02
-BOXED = dict.fromkeys(["axes.spines.top", "axes.spines.right"], True)
-BOXED |= dict.fromkeys(["axes.grid", "figure.constrained_layout.use"], False)
-SHOWN = 0.9  # share of the evaluated points that the colour scale tells apart
+SHOWN = 0.6  # share of the grid that the colour scale tells apart
+LEVELS = 12
+FRAMED = dict.fromkeys(["axes.spines.top", "axes.spines.right"], True) | {"axes.grid": False}
+
+
+def printed(evaluations: pd.DataFrame) -> np.ndarray:
+    """The paper's printed loss of every row, shape (N,), whatever the method minimised."""
+    total = evaluations[list(PRINTED)].sum(axis=1, skipna=False).to_numpy(float)
+    return np.where(np.isfinite(total), total, np.inf)
+
+
+def best_so_far(evaluations: pd.DataFrame) -> np.ndarray:
+    """Row of the least total of the method's own loss among the rows so far, shape (N,)."""
+    total = evaluations.total.to_numpy(float)
+    total = np.where(np.isfinite(total), total, np.inf)
+    better = np.append(True, total[1:] < np.minimum.accumulate(total)[:-1])
+    return np.maximum.accumulate(np.where(better, np.arange(len(total)), 0))
 
 
 @picture()
@@ -45,12 +62,13 @@ def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> Figur
     for band, ax in axes_of.items():
         ends = []
         for method, result in searches[band].items():
-            common = printed(result.evaluations)
-            best = common[best_so_far(result.evaluations)]
+            best = printed(result.evaluations)[best_so_far(result.evaluations)]
             best = np.where(np.isfinite(best), best, np.nan)
+            spent = np.arange(1, len(best) + 1)
+            spent[-1] = max(spent[-1], result.rollouts)  # a fit keeps one row of all that it spends
             style = {"color": styles[method].color, "ls": dashes[method], "lw": 1.3}
-            ax.plot(rollouts(result), best, drawstyle="steps-post", **style)
-            ax.plot(rollouts(result)[-1], best[-1], "o", ms=4, color=style["color"])
+            ax.plot(spent, best, drawstyle="steps-post", **style)
+            ax.plot(spent[-1], best[-1], "o", ms=4, color=style["color"])
             ends.append(best[-1])
         least = np.nanmin(ends)
         ax.set_ylim(0.97 * least, max((1 + NEAR) * least, 1.03 * np.nanmax(ends)))
@@ -62,138 +80,141 @@ def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> Figur
     return figure
 
 
-def rollouts(result: Result) -> np.ndarray:
-    """How many rollouts the search had spent at each of its evaluations, shape (N,).
-
-    A fit keeps one row of all that it spends.
-    """
-    spent = np.arange(1, len(result.evaluations) + 1)
-    spent[-1] = max(spent[-1], result.theta.get("rollouts", 0))
-    return spent
-
-
-@picture(BOXED, dpi=100)
-def corner(result: Result, boxes: ParameterBoxes, title: str) -> Figure:
-    """Every evaluated point in the unit cube, each pair of free parameters against each other.
+@picture()
+def training(curves: dict[str, dict[str, pd.DataFrame]], styles: Styles) -> Figure:
+    """Error of the deterministic policy by iteration of PPO, in its own simulator.
 
     Args:
-        boxes: params.yaml's `parameters`: low, high and scale of each axis.
-        title: Whose search it is.
+        curves: training.parquet of each band and method.
     """
-    evaluations = result.evaluations
-    unit = {n[5:]: evaluations[n].to_numpy(float) for n in evaluations if n.startswith("unit_")}
-    free = [name for name, values in unit.items() if np.ptp(values) > 0] or list(unit)
-    size = len(free)
-    total = evaluations.total.to_numpy(float)
-    good = np.flatnonzero(np.isfinite(total))
-    good = good[np.argsort(-total[good], kind="stable")]  # the best on top
-    failed = ~np.isfinite(total)
-    best = int(np.argmin(np.where(failed, np.inf, total)))
-    worst = max(np.quantile(total[good], SHOWN), 1.001 * total[best])
-    shades = ScalarMappable(LogNorm(total[best], worst), "viridis")
-    color = {"c": total[good], "cmap": shades.cmap, "norm": shades.norm}
-    sizes = np.where(evaluations.phase.to_numpy()[good] == "cma", 5, 14)
-    star = {"color": STAR, "mec": INK}
-    inches = 1.4 + 1.55 * max(size, 3)
-    figure, axes = plt.subplots(size, size, figsize=(inches, inches), squeeze=False)
-    entitle(figure, "Every point that the search tried: dark is good, the star is the best")
-    figure.subplots_adjust(0.08, 0.07, 0.93, 0.95, wspace=0.08, hspace=0.08)
-    for (row, column), ax in np.ndenumerate(axes):
-        if column > row:
-            ax.remove()
-            continue
-        x = free[column]
-        if row == column:
-            ax.scatter(unit[x][good], total[good], s=sizes, lw=0, **color)
-            ax.axvline(unit[x][best], color=PATH, lw=0.8)
-            ax.set(yscale="log", ylim=(0.98 * total[best], 1.3 * worst), ylabel="loss")
-            few_ticks(ax.yaxis)
-            ax.yaxis.tick_right()
-            ax.yaxis.set_label_position("right")
-            ax.tick_params(axis="y", which="both", labelsize=6)
-        else:
-            y = free[row]
-            ax.plot(unit[x][failed], unit[y][failed], "x", ms=3, mew=0.6, color="0.6")
-            ax.scatter(unit[x][good], unit[y][good], s=sizes, lw=0, **color)
-            regions(ax, result, x, y)
-            ax.plot(unit[x][best], unit[y][best], "*", ms=12, mew=0.8, zorder=6, **star)
-            ax.set(ylim=(0, 1))
-            ax.set_yticks(*_ticks(y, boxes, evaluations), fontsize=7)
-        ax.set(xlim=(0, 1))
-        ax.set_xticks(*_ticks(x, boxes, evaluations), fontsize=7)
-        if row == size - 1:
-            ax.set_xlabel(QUANTITIES[x].heading)
-        else:
-            ax.tick_params(labelbottom=False)
-        if column == 0 and row > 0:
-            ax.set_ylabel(QUANTITIES[free[row]].heading)
-        elif row != column:
-            ax.tick_params(labelleft=False)
-    side = figure.add_axes((0.62, 0.9, 0.31, 0.016))
-    bar = figure.colorbar(shades, cax=side, orientation="horizontal", extend="max")
-    bar.set_label(f"loss of {title}")
-    few_ticks(bar.ax.xaxis)
-    bar.ax.tick_params(which="both", labelsize=7)
-    _key(figure, result, failed.any())
+    title = "A policy has converged where its curve stays below the line at 1 cm"
+    figure, axes_of = panels(curves, title, 2.1, sharex=True, sharey=True)
+    for band, ax in axes_of.items():
+        for (method, curve), dash in zip(curves[band].items(), cycle(DASHES)):
+            error = 100 * curve.mean_error
+            ax.plot(curve.iteration, error, color=styles[method].color, lw=1.2, ls=dash)
+        ax.axhline(1, color=INK, lw=0.8)
+        ax.set_xlabel("PPO iteration (line: 1 cm)")
+        log_y(ax)
+    next(iter(axes_of.values())).set_ylabel("mean |landing − target| [cm]")
+    methods = dict.fromkeys(method for of_band in curves.values() for method in of_band)
+    dashes = dict(zip(methods, cycle(DASHES)))
+    explain(figure, [(styles[m].name, mark(color=styles[m].color, ls=dashes[m])) for m in methods])
     return figure
 
 
-def regions(ax: Axes, result: Result, x: str, y: str, paths: bool = True) -> None:
-    """Centres of the regions, their covariances at one deviation, and the paths of CMA-ES."""
-    refined = result.evaluations.loc[result.evaluations.phase == "cma"]
-    searched = {x, y} <= set(result.axes)
-    for number, region in enumerate(result.regions if searched else ()):
-        index = [result.axes.index(x), result.axes.index(y)]
-        across, up = centre = region.mu[index]
-        spread, turn = np.linalg.eigh(region.sigma[np.ix_(index, index)])
-        angle = np.degrees(np.arctan2(turn[1, 1], turn[0, 1]))
-        tall, wide = 2 * np.sqrt(spread)
-        line = {"fill": False, "ec": INK, "lw": 0.7, "zorder": 4}
-        ax.add_patch(Ellipse((across, up), wide, tall, angle=angle, **line))
-        mine = refined.loc[refined.solver == number]
-        way = mine.groupby("generation")[[f"unit_{x}", f"unit_{y}"]].mean().to_numpy()
-        if paths:
-            ax.plot(*np.vstack([centre, way]).T, color=PATH, lw=0.9, zorder=5)
-        ax.plot(across, up, "o", ms=7.5, color="w", mec=INK, mew=0.7, zorder=5)
-        text = {"ha": "center", "va": "center_baseline", "fontsize": 6}
-        ax.text(across, up, str(number + 1), zorder=5.5, **text)
+@dataclass(frozen=True)
+class Landscape:
+    """The paper's loss on a grid of the unit cube through θ*: what its search finds its way on.
+
+    Attributes:
+        x, y: Places along AXES, shape (SIZE,) each.
+        loss: +inf where the simulation fails, shape (SIZE, SIZE), y first.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    loss: np.ndarray
 
 
-def _key(figure: Figure, result: Result, failures: bool) -> None:
-    """Legend in the empty corner."""
-    entries = [("evaluated by the exploration", mark(ls="", marker="o", ms=4, color="0.4"))]
-    if (result.evaluations.phase == "cma").any():
-        entries.append(("evaluated by CMA-ES", mark(ls="", marker="o", ms=2, color="0.4")))
-    if failures:
-        entries.append(("simulation failed", mark(ls="", marker="x", ms=4, color="0.6")))
-    if result.regions:
-        dot = mark(ls="", marker="o", ms=7, color="w", mec=INK)
-        entries += [
-            ("centre of a region, best first", dot),
-            ("its covariance, one deviation", mark(color=INK, lw=0.7)),
-            ("mean of its CMA-ES by iteration", mark(color=PATH, lw=0.9)),
-        ]
-    entries.append(("θ*, the best of all", mark(ls="", marker="*", ms=11, color=STAR, mec=INK)))
-    key(figure, entries, 1, loc="upper right", bbox_to_anchor=(0.95, 0.84), fontsize=8)
+def landscape(run: Run, result: Result) -> Landscape:
+    """Around the regions of a search and where CMA-ES went from them."""
+    params, episode = run.params, run.episodes[result.band]
+    box = SearchBox.of_method(params, result.method)
+    sling = calibrated(params, result.band, result.theta, run.layout.clamps(result.pair))
+    best = box.unit_of(parameters_of(result.theta))[0]
+    x, y = (_span(result, name) for name in AXES)
+    grid = np.tile(best, (SIZE * SIZE, 1))
+    places = [box.names.index(name) for name in AXES]
+    grid[:, places] = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    evaluate = Evaluator(episode, sling, EpisodeLoss.of(params, result.method, episode, sling), box)
+    return Landscape(x, y, evaluate(grid).total.reshape(SIZE, SIZE))
 
 
-def _ticks(
-    name: str, boxes: ParameterBoxes, evaluations: pd.DataFrame
-) -> tuple[list[float], list[str]]:
-    """Places in the unit cube of round physical values, and those values in words."""
-    unit, value = (evaluations[column].to_numpy(float) for column in (f"unit_{name}", name))
-    value = value * QUANTITIES[name].factor
-    log = name in THETA and getattr(boxes, name).scale == "log"
-    scaled = np.log10(value) if log else value
-    first, last = int(unit.argmin()), int(unit.argmax())
-    slope = (scaled[last] - scaled[first]) / (unit[last] - unit[first] or 1.0)
-    low = scaled[first] - slope * unit[first]
-    high = low + slope
-    if log:
-        marks = np.arange(np.ceil(low), high)
-    else:
-        marks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
-    place = (marks - low) / (slope or 1.0)
-    seen = (place > EDGE) & (place < 1 - EDGE)  # those at an edge would meet the neighbours'
-    words = [f"{10**mark if log else mark:g}" for mark in marks[seen]]
-    return place[seen].tolist(), words
+def _span(result: Result, name: str) -> np.ndarray:
+    refined = result.evaluations.loc[result.evaluations.phase == "cma", f"unit_{name}"]
+    axis = result.axes.index(name)
+    centres = [region.mu[axis] for region in result.regions]
+    best = result.evaluations[f"unit_{name}"][result.evaluations.total.argmin()]
+    low, high = np.quantile(refined, [0.02, 0.98])
+    low, high = min([low, best, *centres]) - AROUND, max([high, best, *centres]) + AROUND
+    return np.linspace(max(low, 0), min(high, 1), SIZE)
+
+
+@picture(FRAMED)
+def search(result: Result, chart: Landscape, ranges: dict[str, SearchedRange]) -> Figure:
+    """Three panels, one above the other: exploration, regions, CMA-ES.
+
+    Args:
+        ranges: Of the search, by name.
+    """
+    figure, axes = plt.subplots(3, 1, figsize=(5.2, 7.6), sharex=True, sharey=True)
+    entitle(figure, f"How the search of the paper's loss goes ({result.band})")
+    finite = chart.loss[np.isfinite(chart.loss)]
+    least = finite.min()
+    most = max(np.quantile(finite, SHOWN), 1.01 * least)
+    shades = ScalarMappable(LogNorm(least, most), "viridis")
+    quantities = [QUANTITIES[name] for name in AXES]
+
+    def physical(places: np.ndarray) -> list[np.ndarray]:
+        """Values along AXES of places (N, 2) in the unit cube, in the units of the axes."""
+        sides = zip(quantities, np.transpose(places), strict=True)
+        return [axis.factor * ranges[axis.name].at(side) for axis, side in sides]
+
+    evaluations = result.evaluations
+    places = evaluations[[f"unit_{name}" for name in AXES]].to_numpy()
+    explored, failed = evaluations.phase == "de", ~np.isfinite(evaluations.total)
+    x, y = physical(np.stack([chart.x, chart.y], axis=1))
+    titles = "1 exploration by DE", "2 the best regions, their covariances", "3 CMA-ES in each"
+    for step, (ax, title) in enumerate(zip(axes, titles, strict=True)):
+        ax.set_facecolor("0.85")
+        ax.contourf(
+            x, y, np.ma.masked_invalid(chart.loss), extend="max", cmap=shades.cmap,
+            norm=shades.norm, levels=np.geomspace(least, most, LEVELS),
+        )  # fmt: skip
+        size = 10 if step == 0 else 3
+        ax.scatter(*physical(places[explored & ~failed]), s=size, color="w", ec=INK, lw=0.4)
+        ax.plot(*physical(places[explored & failed]), "x", ms=3.5, mew=0.7, color="0.45")
+        for number, region in enumerate(result.regions if step else ()):
+            ellipse, way = around(result, number, region)
+            ax.plot(*physical(ellipse), color=INK, lw=0.7, zorder=4)
+            if step == 2:
+                ax.plot(*physical(way), color=PATH, lw=0.9, zorder=5)
+            centre = [float(side[0]) for side in physical(way[:1])]
+            ax.plot(*centre, "o", ms=7.5, color="w", mec=INK, mew=0.7, zorder=5)
+            text = {"ha": "center", "va": "center_baseline", "fontsize": 6, "zorder": 5.5}
+            ax.text(*centre, str(number + 1), **text)
+        if step == 2:
+            star = {"color": STAR, "mec": INK, "ms": 13, "mew": 0.8, "zorder": 6}
+            ax.plot(*physical(places[[evaluations.total.argmin()]]), "*", **star)
+        ax.set(xscale=ranges[AXES[0]].scale, yscale=ranges[AXES[1]].scale)
+        ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]], ylabel=quantities[1].heading)
+        ax.set_title(title, fontsize=9, loc="left")
+        few_ticks(ax.yaxis)
+    few_ticks(axes[-1].xaxis)
+    axes[-1].set_xlabel(quantities[0].heading)
+    bar = figure.colorbar(shades, ax=axes, extend="max", label="geom + force + work", aspect=40)
+    few_ticks(bar.ax.yaxis)
+    entries = [
+        ("θ that DE tried", mark(ls="", marker="o", ms=4, color="w", mec=INK)),
+        ("simulation failed", mark(ls="", marker="x", ms=4, color="0.45")),
+        ("covariance, one deviation", mark(color=INK, lw=0.7)),
+        ("mean of CMA-ES", mark(color=PATH, lw=0.9)),
+        ("θ*", mark(ls="", marker="*", ms=11, color=STAR, mec=INK)),
+    ]
+    key(figure, entries, 2)
+    return figure
+
+
+def around(result: Result, number: int, region: Region) -> tuple[np.ndarray, np.ndarray]:
+    """A region's covariance at one deviation, and its centre with the mean of its CMA-ES.
+
+    Points of the unit cube along AXES, shape (N, 2); one of the second an iteration.
+    """
+    index = [result.axes.index(name) for name in AXES]
+    turn = np.linspace(0, 2 * np.pi, 61)
+    spread = np.linalg.cholesky(region.sigma[np.ix_(index, index)])
+    ellipse = region.mu[index] + np.stack([np.cos(turn), np.sin(turn)], axis=1) @ spread.T
+    mine = result.evaluations.query("phase == 'cma' and solver == @number")
+    way = mine[[f"unit_{name}" for name in AXES]].groupby(mine.generation).mean()
+    return ellipse, np.vstack([region.mu[index], np.asarray(way)])

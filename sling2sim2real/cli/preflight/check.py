@@ -161,7 +161,7 @@ def _without(path: Path, problem: UserError | Finding) -> str:
 
 
 def _topics(container: Container) -> list[Topic]:
-    rows = [Topic(c.topic, c.schema.name, len(c.payloads)) for c in container.channels]
+    rows = [Topic(t.name, t.schema.name, len(t.log_times)) for t in container.topics]
     return sorted(rows, key=lambda row: row.topic)
 
 

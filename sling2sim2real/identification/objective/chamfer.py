@@ -1,9 +1,14 @@
 """Distance between measured point clouds and simulated bands, for a batch of rollouts.
 
-A band is a tube around its centre line, one piece an edge. Measured to simulated: each point's
-distance to the surface of the nearest piece. Simulated to measured: for points on the ridge of the
-tube that faces the camera, the distance to the nearest measured point; what the camera cannot see
-counts for nothing.
+It is the mean of both directions' mean distances. The simulated band is
+
+    tube  around its centre line, a piece an edge. Measured to simulated: each point's distance to
+          the surface of the nearest piece. Simulated to measured: for points on the ridge of the
+          tube that faces the camera, the distance to the nearest measured point; what the camera
+          cannot see counts for nothing.
+    mesh  as the paper prints it, between two clouds: vertices all around the tube, in rings that
+          are evenly spaced along the unstretched band, on the side that no camera sees too. Each
+          point's distance is that to the nearest point of the other cloud.
 """
 
 from __future__ import annotations
@@ -17,8 +22,6 @@ if TYPE_CHECKING:
     import warp as wp
 
 LANES = {"cpu": 16, "cuda": 32}
-SAMPLES = 3  # simulated points an edge
-RINGS, AROUND = 125, 8  # vertices along the band and around it: as many as a measured cloud has
 
 
 class Chamfer:
@@ -30,7 +33,8 @@ class Chamfer:
         camera: np.ndarray,
         *,
         radius: float,
-        rest_length: float | np.ndarray,
+        rest_edges: np.ndarray,
+        surface: str = "tube",
         culled: bool = True,
     ) -> None:
         """Keep the clouds, and from their first use on a device a copy there.
@@ -38,15 +42,14 @@ class Chamfer:
         Args:
             clouds: Points of each frame [m], K arrays of shape (P, 3); an empty one counts as NaN.
             camera: Its position [m], shape (3,).
-            radius, rest_length: Of the unstretched band [m]; it thins where it is stretched, as
-                an incompressible body does. One length is shared evenly by the edges; an array
-                gives each edge its own.
+            radius, rest_edges: Of the unstretched band, and of its edges, shape (L - 1,) [m]. It
+                thins where it is stretched, as an incompressible body does.
+            surface: "tube" or "mesh".
             culled: Skip what cannot be nearest; without, the same bits come later.
         """
         self.camera = np.asarray(camera, float)
-        self.radius, self.rest_length = float(radius), np.asarray(rest_length, np.float32)
-        self.culled, self.clouds = culled, clouds
-        self.frames = len(clouds)
+        self.radius, self.rest_edges = float(radius), np.asarray(rest_edges, np.float32)
+        self.surface, self.culled, self.clouds = surface, culled, clouds
         self._packed: dict[str, list[wp.array]] = {}
         self._lock = threading.Lock()
 
@@ -67,50 +70,28 @@ class Chamfer:
         import warp as wp
 
         from sling2sim2real.base.native import empty, run_kernel
+        from sling2sim2real.identification.objective.kernels import chamfer_kernel
 
         count, frames, nodes, _ = center_line.shape
-        if frames != self.frames:
-            raise ValueError(f"{frames} simulated frames, {self.frames} measured")
+        if frames != len(self.clouds):
+            raise ValueError(f"{frames} simulated frames, {len(self.clouds)} measured")
         lanes = LANES["cuda" if device.startswith("cuda") else "cpu"]
-        kernel, kind = self._kernel(nodes - 1, lanes)
+        kernel, kind = chamfer_kernel(self.surface, nodes - 1, lanes, self.culled)
         with self._lock:
             if device not in self._packed:
-                arrays = _pack(self.clouds, lanes)
-                self._packed[device] = [wp.array(array, device=device) for array in arrays]
-            packed = self._packed[device]
-        if isinstance(center_line, np.ndarray):
-            center_line = np.ascontiguousarray(center_line, np.float32)
-            center_line = wp.array(center_line, device=device)
-        rest = self.rest_length
-        if rest.ndim == 0:
-            rest = np.full(nodes - 1, rest / (nodes - 1), np.float32)
+                shared = *_pack(self.clouds, lanes), self.rest_edges
+                self._packed[device] = [wp.array(array, device=device) for array in shared]
         arrays = kind()
-        arrays.points, arrays.balls, arrays.frame_blocks, arrays.frame_groups = packed
-        arrays.rest_edges = wp.array(rest, device=device)
+        arrays.points, arrays.balls, arrays.frame_blocks, arrays.frame_groups, arrays.rest_edges = (
+            self._packed[device]
+        )
+        if isinstance(center_line, np.ndarray):
+            center_line = wp.array(np.ascontiguousarray(center_line, np.float32), device=device)
         arrays.line, arrays.frames = center_line.flatten(), frames
         arrays.radius, arrays.camera = self.radius, wp.vec3(*self.camera)
         arrays.errors = errors = empty(count * frames * 2, wp.float32, device)
         run_kernel(kernel, count * frames, [arrays], device)
         return errors
-
-    def _kernel(self, edges: int, lanes: int) -> tuple[wp.Kernel, type]:
-        from sling2sim2real.identification.objective.kernel import chamfer_kernel
-
-        return chamfer_kernel(edges, SAMPLES, lanes, self.culled)
-
-
-class CloudDistance(Chamfer):
-    """The Chamfer distance as the paper prints it: between two clouds, of which one is simulated.
-
-    That is the mean of both directions' mean distances to the nearest point of the other cloud. The
-    simulated cloud is a mesh's: vertices all around the tube, in rings that are evenly spaced along
-    the unstretched band, on the side that no camera sees too.
-    """
-
-    def _kernel(self, edges: int, lanes: int) -> tuple[wp.Kernel, type]:
-        from sling2sim2real.identification.objective.kernel import clouds_kernel
-
-        return clouds_kernel(edges, RINGS, AROUND, lanes, self.culled)
 
 
 def _pack(clouds: list[np.ndarray], lanes: int) -> tuple[np.ndarray, ...]:

@@ -1,4 +1,10 @@
-"""Losses of a batch of parameters: simulate, compare, and say what failed."""
+"""Losses of a batch of parameters: simulate, compare, and say what failed.
+
+A method's key `engine` names what simulates. Another engine than ours is a function
+`simulate(band, *, episode, parameters, device) -> Rollouts` of whole batches: of a ClampedBand
+(simulator/model.py) with N Parameters (simulator/parameters.py); the rollouts
+(simulator/interaction.py) stay on the host. It runs on one device, whichever it chooses.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +14,29 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from importlib.metadata import entry_points
+from itertools import count
+from pathlib import Path
+from typing import cast
 
 import numpy as np
 
+from sling2sim2real.base.errors import UserError, one_line
+from sling2sim2real.base.imported import imported, is_import
+from sling2sim2real.base.machine import devices, workers
+from sling2sim2real.base.progress import Progress
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.loss import TERMS, EpisodeLoss
-from sling2sim2real.simulator.interaction import Rollouts, interact
+from sling2sim2real.identification.results.theta import sling_of_method
+from sling2sim2real.settings import Settings
+from sling2sim2real.settings.identification import OUR_ENGINE
+from sling2sim2real.simulator.interaction import Rollouts, interact, with_recorded_pads
 from sling2sim2real.simulator.model import ClampedBand
 
 SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
+
+ENTRY_POINT_GROUP = "sling2sim2real.engines"  # of engines that installed packages offer
 
 Simulate = Callable[..., Rollouts]
 simulated: Simulate = partial(interact, fetch=False)  # the loss is computed where the rollouts are
@@ -63,19 +82,42 @@ class Evaluator:
         """Keep what every batch needs.
 
         Args:
+            band: Its pads open as the recording shows, where that says it.
             devices: Of one kind; they share each batch evenly, in their order.
             workers: Threads on the CPU (the kernels release the interpreter); None: all cores.
             simulate: Called as `simulate(band, episode=, parameters=, device=)`.
             whole: One call a batch, on the first device.
         """
         self.box, self.loss = box, loss
-        self._band = band
+        self._band = with_recorded_pads(band, episode)
         self._simulate = partial(simulate, episode=episode)
         on_gpu = devices[0].startswith("cuda")
         self._slice = sys.maxsize if whole else SLICE["cuda" if on_gpu else "cpu"]
         threads = 1 if on_gpu else workers or os.cpu_count()
         self._devices = devices[:1] if whole else devices
         self._pools = [ThreadPoolExecutor(threads) for _ in self._devices]
+
+    @classmethod
+    def of(
+        cls,
+        params: Settings,
+        method: str,
+        episode: Episode,
+        sling: ClampedBand,
+        box: SearchBox | None = None,
+    ) -> Evaluator:
+        """Make it for a method of params.yaml, on the devices that the environment names."""
+        engine = params.methods[method].engine
+        return cls(
+            episode,
+            sling,
+            EpisodeLoss.of(params, method, episode, sling),
+            box or SearchBox.of_method(params, method),
+            devices=devices(),
+            workers=workers(),
+            simulate=simulate_of(engine),
+            whole=engine != OUR_ENGINE,
+        )
 
     def __call__(self, unit: np.ndarray) -> Evaluation:
         """Evaluate points of the unit cube, shape (N, D)."""
@@ -112,13 +154,58 @@ class Evaluator:
             return self.loss.terms(rollouts), rollouts.failure
 
 
-class Penalty:
-    """The losses that an optimiser gets: a failed point has twice the worst finite loss so far."""
+def logging_evaluator(
+    title: str,
+    params: Settings,
+    band: str,
+    method: str,
+    episode: Episode,
+    clamps: Path | None,
+    rollouts: int,
+) -> Callable[[np.ndarray], Evaluation]:
+    """The evaluator of a stage that has so many rollouts ahead; it says how it gets on.
 
-    def __init__(self) -> None:
-        self.worst = 0.0
+    Args:
+        title: Of the lines: stage and pair.
+        clamps: As `load_sling` has it.
+    """
+    sling = sling_of_method(params, band, method, clamps)
+    evaluate = Evaluator.of(params, method, episode, sling)
+    progress, generations, best = Progress(title, rollouts, "rollouts"), count(), np.inf
 
-    def __call__(self, total: np.ndarray) -> np.ndarray:
-        finite = np.isfinite(total)
-        self.worst = max([self.worst, *total[finite]])
-        return np.where(finite, total, 2 * self.worst if self.worst else 1e6)
+    def evaluated(unit: np.ndarray) -> Evaluation:
+        nonlocal best
+        evaluation = evaluate(unit)
+        size, failed = len(evaluation.total), int(np.isinf(evaluation.total).sum())
+        best = min(best, evaluation.total.min())
+        facts = f"generation {next(generations)}", f"best {best:.5g}", f"failed {failed}/{size}"
+        progress.advance(size, *facts)
+        return evaluation
+
+    return evaluated
+
+
+def simulate_of(engine: str) -> Simulate:
+    """The function of an engine: OUR_ENGINE, an installed package's, or `package.module:function`.
+
+    Raises UserError where there is no such function.
+    """
+    if engine == OUR_ENGINE:
+        return simulated
+    try:
+        simulate = imported(engine if is_import(engine) else _installed(engine))
+    except Exception as error:  # a module of the user's may raise anything
+        message = one_line(f"{type(error).__name__}: {error}")
+        raise UserError(f"engine {engine}: cannot be imported ({message})") from error
+    if not callable(simulate):
+        raise UserError(f"engine {engine}: must be a function; see docs/simulator.md")
+    return cast(Simulate, simulate)
+
+
+def _installed(engine: str) -> str:
+    """Where an installed package has an engine, as `package.module:function`."""
+    for entry in entry_points(group=ENTRY_POINT_GROUP, name=engine):
+        return entry.value
+    raise LookupError(
+        f"no installed package has it among its {ENTRY_POINT_GROUP}; install this one anew"
+    )

@@ -19,17 +19,18 @@ import numpy as np
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.signal import cutoff_hz, recording_matrix
-from sling2sim2real.identification.objective.chamfer import Chamfer, CloudDistance
-from sling2sim2real.identification.objective.device_terms import DeviceTerms
+from sling2sim2real.identification.objective.chamfer import Chamfer
 from sling2sim2real.identification.results.evaluations import TERMS
 from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.interaction import Rollouts
 from sling2sim2real.simulator.model import ClampedBand
 
 if TYPE_CHECKING:
+    import warp as wp
     from scipy.sparse import csr_array
 
 FILTER_LOCK = threading.Lock()  # while a filter is made, which takes a second
+SURFACES = {"symmetric": "tube", "clouds": "mesh"}  # of `loss.chamfer`
 
 
 class EpisodeLoss:
@@ -40,7 +41,7 @@ class EpisodeLoss:
         episode: Episode,
         *,
         radius: float,
-        rest_length: float | np.ndarray,
+        rest_edges: np.ndarray,
         weights: dict[str, float],
         cutoff: float,
         median_window: int = 7,
@@ -49,7 +50,7 @@ class EpisodeLoss:
         """Prepare the recorded side.
 
         Args:
-            radius, rest_length: Of the unstretched band [m]; the length whole or by edges.
+            radius, rest_edges: Of the unstretched band, and of its edges [m].
             weights: Of each of TERMS; a term that weighs nothing is still computed.
             cutoff: Of the low-pass that the recorded force went through [Hz].
             median_window: Samples of the median filter on forces and velocity, odd.
@@ -60,51 +61,55 @@ class EpisodeLoss:
             UserError: No cloud has points.
         """
         self.weights = {name: float(weights[name]) for name in TERMS}
-        self.median_window = median_window
-        self.cutoff = cutoff
+        self.median_window, self.cutoff = median_window, cutoff
         self.time, self.period = episode.time, episode.sample_period
-        self.velocity = self.smooth(episode.velocity)
-        self.force = self.smooth(episode.force)
-        distance = CloudDistance if chamfer == "clouds" else Chamfer
-        self.chamfer = distance(
-            episode.clouds, episode.camera, radius=radius, rest_length=rest_length
+        self.chamfer = Chamfer(
+            episode.clouds,
+            episode.camera,
+            radius=radius,
+            rest_edges=rest_edges,
+            surface=SURFACES[chamfer],
         )
-        self._seen = np.array([len(cloud) > 0 for cloud in episode.clouds])
-        if not self._seen.any():
+        seen = np.array([len(cloud) > 0 for cloud in episode.clouds])
+        if not seen.any():
             raise UserError(f"episode of {episode.band}: no camera frame shows the band")
-        trapezoids = np.full(len(self.time), self.period)
-        trapezoids[[0, -1]] /= 2
-        self._on_device = DeviceTerms(
-            self.chamfer,
-            force=self.force,
-            velocity=self.velocity,
-            window=median_window,
-            sample_weights=np.stack([np.full(len(self.time), 1 / len(self.time)), trapezoids]),
-            frame_weights=100 * (self._seen / self._seen.sum()),
-        )
+        self._recorded = {
+            "measured": _median(episode.force, median_window),
+            "velocity": _median(episode.velocity, median_window),
+            "frame_weights": 100 * (seen / seen.sum()),
+        }
+        self._copies: dict[str, tuple[csr_array, dict[str, wp.array]]] = {}
+        self._lock = threading.Lock()
 
     @classmethod
     def of(cls, params: Settings, method: str, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
         """Make it from params.yaml's `loss`, `force` and `methods.<method>`."""
-        return cls._weighed(params, dict(params.methods[method].weights), episode, sling)
+        weights = dict(params.methods[method].weights)
+        return cls._weighed(params, weights, episode, sling, params.loss.chamfer)
 
     @classmethod
     def plain(cls, params: Settings, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
-        """Geometry and force alone, for a part of an episode."""
-        return cls._weighed(params, {"geom": 1.0, "force": 1.0, "work": 0.0}, episode, sling)
+        """Geometry, of what the camera sees, and force alone, for a part of an episode."""
+        weights = {"geom": 1.0, "force": 1.0, "work": 0.0}
+        return cls._weighed(params, weights, episode, sling, "symmetric")
 
     @classmethod
     def _weighed(
-        cls, params: Settings, weights: dict[str, float], episode: Episode, sling: ClampedBand
+        cls,
+        params: Settings,
+        weights: dict[str, float],
+        episode: Episode,
+        sling: ClampedBand,
+        chamfer: str,
     ) -> EpisodeLoss:
         return cls(
             episode,
             radius=sling.radius,
-            rest_length=sling.edge_lengths,
+            rest_edges=sling.edge_lengths,
             weights=weights,
             cutoff=cutoff_hz(params.force.cutoff, params.force.cutoff_unit),
             median_window=params.loss.median_window,
-            chamfer=params.loss.chamfer,
+            chamfer=chamfer,
         )
 
     def terms(self, rollouts: Rollouts) -> dict[str, np.ndarray]:
@@ -113,55 +118,73 @@ class EpisodeLoss:
         They are computed on the device that holds the rollouts. A rollout's terms are the same to
         the bit in any batch.
         """
-        if not isinstance(rollouts.force, np.ndarray):
-            on_device = self._on_device(rollouts, self._filter(rollouts.times))
-            return dict(zip(TERMS, on_device.T, strict=True))
-        gap, frames = self._gap(rollouts), self.frames(rollouts)
-        power = np.einsum("ntc,tc->nt", gap, self.velocity)
-        work = (power[:, :-1] + power[:, 1:]).sum(axis=1)
-        return {
-            # not frames[:, seen]: its order in memory, and so the sum's, would depend on N
-            "geom": 100 * frames.compress(self._seen, axis=1).mean(axis=1),
-            "force": np.linalg.norm(gap, axis=2).mean(axis=1),
-            "work": np.abs(work) / 2 * self.period,
-        }
+        import warp as wp
+
+        from sling2sim2real.base.native import empty, run_threads
+        from sling2sim2real.identification.objective.kernels import terms_kernels
+
+        line, force, device = rollouts.center_line, rollouts.force, _device_of(rollouts)
+        count, samples, frames = len(force), len(self.time), len(self.chamfer.clouds)
+        errors = self.chamfer.errors(line, device).reshape((count, frames, 2))
+        double = force.dtype in (np.float64, wp.float64)
+        filtered, terms = terms_kernels(wp.float64 if double else wp.float32)
+        if isinstance(force, np.ndarray):
+            force = wp.array(force, device=device)
+        there = self._on(device, rollouts.times)
+        simulated = empty((count, samples), wp.vec3d, device)
+        rows = there["first"], there["columns"], there["values"]
+        run_threads(filtered, (count, samples), [force, *rows, simulated], device)
+        result = empty(count, wp.vec3d, device)
+        recorded = there["measured"], there["velocity"], wp.float64(self.period)
+        geom = errors, there["frame_weights"]
+        inputs = [simulated, *recorded, *geom, self.median_window, result]
+        run_threads(terms, count, inputs, device)
+        return dict(zip(TERMS, result.numpy().T, strict=True))
 
     def total(self, terms: dict[str, np.ndarray]) -> np.ndarray:
         """Weighted sum of the terms, shape (N,); one without weight may be NaN."""
         weighed = (weight * terms[name] for name, weight in self.weights.items() if weight)
         return sum(weighed, np.zeros(()))
 
-    def filtered(self, rollouts: Rollouts) -> np.ndarray:
-        """The simulated force as the record would have it [N], shape (N, T, 3), before `smooth`."""
-        force = rollouts.force
-        force = force if isinstance(force, np.ndarray) else force.numpy()
-        count, steps, _ = force.shape
-        flat = force.transpose(1, 0, 2).reshape(steps, -1)
-        return (self._filter(rollouts.times) @ flat).reshape(-1, count, 3).transpose(1, 0, 2)
-
     def frames(self, rollouts: Rollouts) -> np.ndarray:
         """Chamfer distance of each camera frame [m], shape (N, K); NaN where it shows nothing."""
-        line = rollouts.center_line
-        return self.chamfer(line, "cpu" if isinstance(line, np.ndarray) else str(line.device))
+        return self.chamfer(rollouts.center_line, _device_of(rollouts))
 
-    def smooth(self, signal: np.ndarray) -> np.ndarray:
-        """Median filter along the samples of (..., T, 3)."""
-        from scipy.ndimage import median_filter
+    def _on(self, device: str, times: np.ndarray) -> dict[str, wp.array]:
+        """What all rollouts share, there; the filter of other times replaces the last one."""
+        import warp as wp
 
-        window = (1,) * (signal.ndim - 2) + (self.median_window, 1)
-        return median_filter(signal, size=window, mode="nearest")
-
-    def _gap(self, rollouts: Rollouts) -> np.ndarray:
-        """Measured less simulated force [N], shape (N, T, 3)."""
-        return self.force - self.smooth(self.filtered(rollouts))
-
-    def _filter(self, times: np.ndarray) -> csr_array:
-        """Filter of forces at simulated times (S,), as the recorded force was filtered."""
         start = float(self.time[0] - self.period / 2)
         with FILTER_LOCK:
-            return _recording_filter(
+            matrix = _recording_filter(
                 times.tobytes(), self.cutoff, start, self.period, len(self.time)
             )
+        with self._lock:
+            kept, copies = self._copies.get(device, (None, {}))
+            if kept is not matrix:
+                rows = {"first": matrix.indptr, "columns": matrix.indices}
+                kinds = {"measured": wp.vec3d, "velocity": wp.vec3d}
+                copies = {
+                    name: wp.array(array.astype(np.int32), device=device)
+                    for name, array in rows.items()
+                } | {
+                    name: wp.array(array, dtype=kinds.get(name, wp.float64), device=device)
+                    for name, array in {**self._recorded, "values": matrix.data}.items()
+                }
+                self._copies[device] = matrix, copies
+            return copies
+
+
+def _device_of(rollouts: Rollouts) -> str:
+    line = rollouts.center_line
+    return "cpu" if isinstance(line, np.ndarray) else str(line.device)
+
+
+def _median(signal: np.ndarray, window: int) -> np.ndarray:
+    """Median filter along the samples of (T, 3)."""
+    from scipy.ndimage import median_filter
+
+    return median_filter(signal, size=(window, 1), mode="nearest")
 
 
 @lru_cache(maxsize=128)  # shared by all losses of an episode, such as the report's replays
@@ -170,8 +193,8 @@ def _recording_filter(
 ) -> csr_array:
     """Matrix (T, S) from forces at simulated times (S,) to the episode's T filtered samples.
 
-    It is the recorded force's way (interpolation, low-pass, averages), which is linear, and
-    forgets: weights that no rounding would show are left out.
+    It does what was done to the recorded force (interpolation, low-pass, averages), which is
+    linear, and forgets: weights that no rounding would show are left out.
     """
     from scipy.sparse import csr_array
 

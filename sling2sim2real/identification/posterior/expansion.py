@@ -1,4 +1,4 @@
-"""Residuals of a recording around a point, whitened, and what its own nuisances leave of them."""
+"""Residuals around a point, whitened, and what nuisances leave of them."""
 
 from __future__ import annotations
 
@@ -10,6 +10,63 @@ import numpy as np
 from sling2sim2real.identification.posterior.residuals import Residuals
 
 NO_AUTOCORRELATION = 0.05  # an autocorrelation that is none
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Residuals over their spread at a point, and how they change: what evidence is to the fit.
+
+    Attributes:
+        residual: Shape (Q,); its squares add up to the misfit.
+        slopes, nuisance_slopes: With D coordinates and I nuisances, shapes (Q, D) and (Q, I).
+        uncounted: What of the loss factor's slope does not count, shape (Q,).
+    """
+
+    residual: np.ndarray
+    slopes: np.ndarray
+    nuisance_slopes: np.ndarray
+    uncounted: np.ndarray
+
+    @property
+    def misfit(self) -> float:
+        """-2 log p, the nuisances as they are."""
+        return float(self.residual @ self.residual)
+
+    @cached_property
+    def _factors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Orthonormal basis (Q, I) of what the nuisances do, and the triangle (I, I)."""
+        basis, triangle = np.linalg.qr(self.nuisance_slopes)
+        return basis, triangle
+
+    def cleared(self, vectors: np.ndarray) -> np.ndarray:
+        """What the nuisances leave of vectors (N, Q): least squares."""
+        basis, _ = self._factors
+        return vectors - (vectors @ basis) @ basis.T
+
+    @cached_property
+    def hessian(self) -> np.ndarray:
+        """The least over n of |residual + slopes d + nuisance_slopes n|^2 is
+        const - 2 gradient d + d' hessian d; shape (D, D).
+        """
+        slopes = self.cleared(self.slopes.T)
+        return slopes @ slopes.T
+
+    @cached_property
+    def gradient(self) -> np.ndarray:
+        """As `hessian`, shape (D,)."""
+        return -self.slopes.T @ self.cleared(self.residual[None])[0]
+
+    @cached_property
+    def nuisance_change(self) -> np.ndarray:
+        """How the best n changes with the coordinates, shape (I, D)."""
+        basis, triangle = self._factors
+        return -np.linalg.solve(triangle, basis.T @ self.slopes)
+
+    @cached_property
+    def nuisance_spread(self) -> np.ndarray:
+        """Standard deviations of n, given the coordinates, shape (I,)."""
+        _, triangle = self._factors
+        return np.linalg.norm(np.linalg.inv(triangle), axis=1)
 
 
 @dataclass(frozen=True)
@@ -44,22 +101,17 @@ class Form:
 
 
 @dataclass(frozen=True)
-class Expansion:
-    """Whitened residuals of a recording at (phi, n), and how they change; Q rows, n's priors last.
+class Expansion(Linearised):
+    """A recording's, with its simulated nuisances, whose own priors are the last rows.
+
+    The linear nuisances are at their best.
 
     Attributes:
         form: Of the density.
-        left: Shape (Q,); its squares add up to the misfit.
-        slopes, nuisance_slopes: Shapes (Q, D) and (Q, 3).
-        uncounted: What the loss factor does to the force, which does not count, shape (Q,).
         origin: The logarithm of the loss factor there.
     """
 
     form: Form
-    left: np.ndarray
-    slopes: np.ndarray
-    nuisance_slopes: np.ndarray
-    uncounted: np.ndarray
     origin: float
 
     @classmethod
@@ -77,64 +129,23 @@ class Expansion:
     ) -> Expansion:
         """Make it of residuals (R,), their slopes (D, R), (3, R) and (R,), and n's priors (3,)."""
 
-        def rows(vectors: np.ndarray, priors: np.ndarray) -> np.ndarray:
-            return np.hstack([form.whitened(vectors), priors]).T
+        def rows(vectors: np.ndarray, priors: np.ndarray | None = None) -> np.ndarray:
+            none = np.zeros((len(vectors), len(prior_slopes)))
+            return np.hstack([form.whitened(vectors), none if priors is None else priors]).T
 
-        count = len(priors)
         return cls(
+            rows(here[None], priors[None])[:, 0],
+            rows(slopes),
+            rows(nuisance_slopes, np.diag(prior_slopes)),
+            rows(uncounted[None])[:, 0],
             form,
-            left=rows(here[None], priors[None])[:, 0],
-            slopes=rows(slopes, np.zeros((len(slopes), count))),
-            nuisance_slopes=rows(nuisance_slopes, np.diag(prior_slopes)),
-            uncounted=rows(uncounted[None], np.zeros((1, count)))[:, 0],
-            origin=origin,
+            origin,
         )
-
-    @property
-    def misfit(self) -> float:
-        """-2 log p, the linear nuisances at their best and the simulated ones as they are."""
-        return float(self.left @ self.left)
-
-    @cached_property
-    def _factors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Orthonormal basis (Q, 3) of what the simulated nuisances do, and the triangle (3, 3)."""
-        basis, triangle = np.linalg.qr(self.nuisance_slopes)
-        return basis, triangle
-
-    def cleared(self, vectors: np.ndarray) -> np.ndarray:
-        """What the simulated nuisances leave of vectors (N, Q): least squares."""
-        basis, _ = self._factors
-        return vectors - (vectors @ basis) @ basis.T
-
-    @cached_property
-    def hessian(self) -> np.ndarray:
-        """The least over n of |left + slopes d + nuisance_slopes n|^2 is
-        const - 2 gradient d + d' hessian d; shape (D, D).
-        """
-        slopes = self.cleared(self.slopes.T)
-        return slopes @ slopes.T
-
-    @cached_property
-    def gradient(self) -> np.ndarray:
-        """As `hessian`, shape (D,)."""
-        return -self.slopes.T @ self.cleared(self.left[None])[0]
-
-    @cached_property
-    def nuisance_change(self) -> np.ndarray:
-        """How the best n changes with phi, shape (3, D)."""
-        basis, triangle = self._factors
-        return -np.linalg.solve(triangle, basis.T @ self.slopes)
-
-    @cached_property
-    def nuisance_spread(self) -> np.ndarray:
-        """Standard deviations of n, given phi, shape (3,)."""
-        _, triangle = self._factors
-        return np.linalg.norm(np.linalg.inv(triangle), axis=1)
 
     @property
     def _residuals(self) -> np.ndarray:
         """What the linear nuisances leave [N, m], shape (R,)."""
-        return self.left[: len(self.form.weight)] / self.form.weight
+        return self.residual[: len(self.form.weight)] / self.form.weight
 
     @property
     def _bins(self) -> np.ndarray:
@@ -188,12 +199,12 @@ class Expansion:
         return (episode.cloud_time[np.unique(seen)] - episode.release_time).tolist()
 
 
-def _repeated(left: np.ndarray) -> float:
+def _repeated(samples: np.ndarray) -> float:
     """Root mean square of samples (S,), times the root of their autocorrelation time in samples."""
-    size = left @ left
+    size = samples @ samples
     if not size:
         return 0.0
-    alike = np.correlate(left, left, "full")[len(left) :] / size
+    alike = np.correlate(samples, samples, "full")[len(samples) :] / size
     ends = np.flatnonzero(alike < NO_AUTOCORRELATION)
     time = 1 + 2 * alike[: ends[0] if len(ends) else len(alike)].sum()
-    return float(np.sqrt(size / len(left) * time))
+    return float(np.sqrt(size / len(samples) * time))

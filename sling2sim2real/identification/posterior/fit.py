@@ -19,11 +19,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.optimize import lsq_linear
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.identification.posterior.coordinates import LOSS, Coordinates
-from sling2sim2real.identification.posterior.expansion import Expansion
+from sling2sim2real.identification.posterior.expansion import Expansion, Linearised
 from sling2sim2real.identification.posterior.launches import LaunchExpansion, LaunchLikelihood
 from sling2sim2real.identification.posterior.likelihood import SIMULATED, Failed, Likelihood
 
@@ -53,8 +54,7 @@ class Fit:
         nuisances: Of each recording, shape (N, 3).
         expansions: Of each recording there.
         launches: Their expansion there; None without.
-        left, slopes, uncounted: r, J and what of J's loss factor does not count; shapes (Q,),
-            (Q, D + 3 N) and (Q,).
+        evidence: Of all of them and of the priors: r, J by phi and by n.
         hessian, gradient: Of -log p in phi alone, and of log p: 0 but at bounds; (D, D), (D,).
         steps: How many expansions it took.
         settled: Whether the fit ended near to where it began to take one form of the density.
@@ -64,9 +64,7 @@ class Fit:
     nuisances: np.ndarray
     expansions: list[Expansion]
     launches: LaunchExpansion | None
-    left: np.ndarray
-    slopes: np.ndarray
-    uncounted: np.ndarray
+    evidence: Linearised
     hessian: np.ndarray
     gradient: np.ndarray
     steps: int
@@ -75,12 +73,13 @@ class Fit:
     @property
     def misfit(self) -> float:
         """-2 log p, priors included."""
-        return float(self.left @ self.left)
+        return self.evidence.misfit
 
     def misfit_of(self, other: Fit) -> float:
         """Another point's in the form that the density has here."""
-        left = other.left - (other.phi[LOSS] - self.phi[LOSS]) * self.uncounted
-        return float(left @ left)
+        moved = (other.phi[LOSS] - self.phi[LOSS]) * self.evidence.uncounted
+        residual = other.evidence.residual - moved
+        return float(residual @ residual)
 
     def size(self, step: np.ndarray) -> float:
         """Length of a step of coordinates (D,), in standard deviations along it (Mahalanobis)."""
@@ -177,11 +176,13 @@ def _descended(
 
 def _step(at: Fit, coordinates: Coordinates, damp: float) -> np.ndarray:
     """Least of |r + J d|^2, damped, within the bounds and LONGEST_STEP, shape (D + 3 N,)."""
-    count, unknowns = len(at.phi), at.slopes.shape[1]
-    size = np.maximum(np.linalg.norm(at.slopes, axis=0), LEAST_SLOPE)
-    design = np.vstack([at.slopes / size, np.sqrt(damp) * np.eye(unknowns)])
+    residual, slopes = at.evidence.residual, at.evidence.slopes
+    slopes = np.hstack([slopes, at.evidence.nuisance_slopes])
+    count, unknowns = len(at.phi), slopes.shape[1]
+    size = np.maximum(np.linalg.norm(slopes, axis=0), LEAST_SLOPE)
+    design = np.vstack([slopes / size, np.sqrt(damp) * np.eye(unknowns)])
     basis, triangle = np.linalg.qr(design)
-    aim = -basis[: len(at.left)].T @ at.left
+    aim = -basis[: len(residual)].T @ residual
     low, high = np.full((2, unknowns), [[-np.inf], [np.inf]])
     longest = LONGEST_STEP * coordinates.steps
     low[:count] = np.maximum(coordinates.low - at.phi, -longest)
@@ -209,42 +210,25 @@ def _stacked(
     Args:
         left_out: Which launches do not count; None: those that fail here.
     """
-    count, own = len(phi), nuisances.shape[1]
-    root = np.sqrt(coordinates.precision)
-    left = [root * (phi - coordinates.expected)]
-    slopes, uncounted = [np.diag(root)], [np.zeros(count)]
-    hessian, gradient = np.diag(coordinates.precision), -root * left[0]
+    root, count = np.sqrt(coordinates.precision), len(phi)
+    gap = root * (phi - coordinates.expected)
+    prior = Linearised(gap, np.diag(root), np.zeros((count, 0)), np.zeros(count))
+    rows, parts = [prior], []
     if launched:
         left_out = launched.failed if left_out is None else left_out
         if (launched.failed & ~left_out).any():
             raise Failed("a launch that landed fails")
-        left.append(launched.gap[~left_out])
-        slopes.append(-launched.design[:, ~left_out].T)
-        uncounted.append(np.zeros(len(left[-1])))
-        hessian = hessian + launched.hessian
-        gradient = gradient + launched.gradient
-    slopes = [np.pad(rows, ((0, 0), (0, own * len(expansions)))) for rows in slopes]
-    for number, expansion in enumerate(expansions):
-        rows = np.zeros((len(expansion.left), count + nuisances.size))
-        rows[:, :count] = expansion.slopes
-        rows[:, count + own * number : count + own * (number + 1)] = expansion.nuisance_slopes
-        left.append(expansion.left)
-        slopes.append(rows)
-        uncounted.append(expansion.uncounted)
-        hessian = hessian + expansion.hessian
-        gradient = gradient + expansion.gradient
-    return Fit(
-        phi,
-        nuisances,
-        expansions,
-        launched,
-        np.concatenate(left),
-        np.vstack(slopes),
-        np.concatenate(uncounted),
-        hessian,
-        gradient,
-        steps,
+        rows, parts = [prior, launched.of(~left_out)], [launched.landed]
+    rows, parts = [*rows, *expansions], [*parts, *expansions]
+    evidence = Linearised(
+        np.concatenate([part.residual for part in rows]),
+        np.vstack([part.slopes for part in rows]),
+        np.asarray(block_diag(*(part.nuisance_slopes for part in rows))),
+        np.concatenate([part.uncounted for part in rows]),
     )
+    hessian = sum((part.hessian for part in parts), np.diag(coordinates.precision))
+    gradient = sum((part.gradient for part in parts), -root * gap)
+    return Fit(phi, nuisances, expansions, launched, evidence, hessian, gradient, steps)
 
 
 def widened(fitted: Fit, coordinates: Coordinates, by: float) -> Fit:

@@ -7,7 +7,7 @@ the covariance by plain algebra.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,34 +70,32 @@ class LandingModel:
 
     def after(self, covariance: np.ndarray | None = None, draw: float = 1.0) -> np.ndarray:
         """Half widths [m], shape (T,), with another covariance and a share of the draw's error."""
-        now, then = (
-            np.einsum("td,de,te->t", self.gradient, covariance_t, self.gradient)
-            + (share * self.draw) ** 2
-            for covariance_t, share in (
-                (self.covariance, 1.0),
-                (self.covariance if covariance is None else covariance, draw),
-            )
-        )
-        return self.half_width * np.sqrt(then / now)
+
+        def variance(covariance: np.ndarray, draw: float) -> np.ndarray:
+            spread = np.einsum("td,de,te->t", self.gradient, covariance, self.gradient)
+            return spread + (draw * self.draw) ** 2
+
+        then = variance(self.covariance if covariance is None else covariance, draw)
+        return self.half_width * np.sqrt(then / variance(self.covariance, 1.0))
+
+    def measured(self, directions: np.ndarray, noise: float) -> np.ndarray:
+        """Covariance after K linear combinations (K, D) of the unknowns were measured (Kalman).
+
+        Args:
+            noise: Variance of each measurement.
+        """
+        explained = self.covariance @ directions.T
+        innovation = directions @ explained + noise * np.eye(len(directions))
+        return self.covariance - explained @ np.linalg.solve(innovation, explained.T)
 
     def launched(self, aim: int, tape: float, count: int = 1) -> np.ndarray:
         """Covariance after `count` launches at one of the targets were measured to `tape` [m]."""
-        slope = self.gradient[aim]
-        noise = (self.draw[aim] ** 2 + tape**2) / count
-        explained = self.covariance @ slope
-        return self.covariance - np.outer(explained, explained) / (slope @ explained + noise)
+        return self.measured(self.gradient[[aim]], (self.draw[aim] ** 2 + tape**2) / count)
 
-    def exact(self, names: Collection[str]) -> np.ndarray:
-        """Covariance if these unknowns were known exactly."""
+    def known(self, *names: str, spread: float = 0.0) -> np.ndarray:
+        """Covariance after unknowns were measured to a standard deviation."""
         which = [self.names.index(name) for name in names if name in self.names]
-        explained = self.covariance[:, which]
-        return self.covariance - explained @ np.linalg.solve(explained[which], explained.T)
-
-    def explained(self, name: str, spread: float) -> np.ndarray:
-        """Covariance after an unknown was measured to a standard deviation."""
-        place = self.names.index(name)
-        explained = self.covariance[:, place]
-        return self.covariance - np.outer(explained, explained) / (explained[place] + spread**2)
+        return self.measured(np.eye(len(self.names))[which], spread**2)
 
     def pulled(self, pulls: int = 1) -> np.ndarray:
         """Covariance after another pull that tells as much as each of the `pulls` did."""

@@ -1,4 +1,4 @@
-"""A band's parameters from its recordings and launches, as the density stage writes them.
+"""A band's parameters from its recordings and launches.
 
 One density: its mode is θ*, its samples the intervals. With several recordings it is as wide as
 they differ (Birge's ratio, Phys. Rev. 40, 1932): their disagreement beyond what each leaves
@@ -14,31 +14,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sling2sim2real.base.machine import cores
-from sling2sim2real.base.parameters import TABLE
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.pull import deepest_draw, launch_history
 from sling2sim2real.episode.signal import cutoff_hz
 from sling2sim2real.identification.posterior.coordinates import Coordinates
 from sling2sim2real.identification.posterior.fit import Fit, fit, widened
-from sling2sim2real.identification.posterior.launches import (
-    Evidence,
-    LaunchLikelihood,
-    without_each,
-)
+from sling2sim2real.identification.posterior.launches import Evidence, LaunchLikelihood
 from sling2sim2real.identification.posterior.likelihood import SIMULATED, Failed, Likelihood
 from sling2sim2real.identification.posterior.residuals import BINS, LEAST_POINTS
 from sling2sim2real.identification.posterior.sampling import SAMPLES, Remaining, samples_of
-from sling2sim2real.identification.results.theta import content_of
 from sling2sim2real.settings import Settings
-from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.simulator.model import ClampedBand, LaunchHistory
-from sling2sim2real.simulator.parameters import EXTRA, Parameters
+from sling2sim2real.simulator.parameters import Parameters
 from sling2sim2real.simulator.rubber import RUBBER
 
-LEVEL = 0.9
-SI_UNITS = {row.name: row.si for row in TABLE}
 WORTH_WIDENING = 1.2  # times the usual spread: less changes no interval by much
-IDENTIFIABLE_SHARE = 2 / 3  # of the prior's interval: one as wide tells nothing
 
 
 @dataclass(frozen=True)
@@ -179,170 +169,3 @@ def birge_ratio(fitted: Fit) -> float:
         total += expansion.gradient @ inverse @ expansion.gradient
         freedom += np.trace(inverse @ expansion.hessian @ (np.eye(len(share)) - share))
     return float(np.sqrt(max(total / max(freedom, 1e-9), 1.0)))
-
-
-def theta_entries(identified: Identified) -> dict:
-    """What a θ file holds of the mode: of the band after its recordings and launches."""
-    episodes = [recording.episode for recording in identified.recordings]
-    history = recorded_history(identified.recordings[0].sling, episodes)
-    if history and identified.launches:
-        history = replace(history, deepest=identified.launches.after)
-    return content_of(identified.mode, history)
-
-
-def confidence(identified: Identified) -> dict:
-    """What a θ file says under `confidence`, ready for JSON.
-
-    A parameter is identifiable if its interval is less than IDENTIFIABLE_SHARE of its prior's, as
-    the coordinate that shows it has them.
-    """
-    samples, mode, parameters = identified.parameters, identified.mode.sample(), {}
-    columns = {name: samples.column(name) for name in samples.names}
-    product = "damping_product"
-    columns[product] = columns["elasticity_damping"] * columns["damping_scale"]
-    mode[product] = mode["elasticity_damping"] * mode["damping_scale"]
-    priors = _priors(identified)
-    for name in parameter_names(samples.law):
-        low, high = interval(columns[name], mode[name])
-        entry = {"low": low, "high": high, "identifiable": name in priors}
-        if name in priors:
-            entry |= priors[name]
-        else:
-            entry["fixed"] = True
-        parameters[name] = entry
-    derived = {
-        name: _told(columns[name], mode[name], SI_UNITS[name]) | priors[name]
-        for name in (*EXTRA, product)
-    }
-    derived |= _clocks(identified)
-    return {
-        "level": LEVEL,
-        "parameters": parameters,
-        "derived": derived,
-        "correlation": {
-            "names": list(identified.coordinates.names),
-            "matrix": correlation(identified.samples).tolist(),
-        },
-        "recordings": [_left(identified, number) for number in range(len(identified.recordings))],
-        "disagreement": identified.birge,
-        "launches": _launched(identified),
-        "steps": identified.fit.steps,
-        "settled": identified.fit.settled,
-        "effective_samples": identified.effective,
-    }
-
-
-def _priors(identified: Identified) -> dict[str, dict]:
-    """Priors of what is not fixed: the interval, all else at the mode; and if it is identified."""
-    coordinates, result = identified.coordinates, {}
-    ends = coordinates.prior(LEVEL)
-    widths = np.ptp(
-        np.quantile(identified.samples, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0), axis=0
-    )
-    for name in (*parameter_names(coordinates.law), *EXTRA, "damping_product"):
-        axis = coordinates.shows(name)
-        if axis is None:
-            continue
-        phi = np.repeat(identified.fit.phi[None], 2, axis=0)
-        phi[:, axis] = ends[:, axis]
-        at = coordinates.parameters(phi)
-        if name == "damping_product":
-            values = at.column("elasticity_damping") * at.column("damping_scale")
-        else:
-            values = at.column(name)
-        summary = bool(widths[axis] < IDENTIFIABLE_SHARE * np.ptp(ends[:, axis]))
-        result[name] = {"prior": values.tolist(), "identifiable": summary}
-    return result
-
-
-def correlation(samples: np.ndarray) -> np.ndarray:
-    """Correlations of D columns of samples (M, D), shape (D, D); one that is constant has none."""
-    varies = np.ptp(samples, axis=0) > 0
-    matrix = np.eye(len(varies))
-    matrix[np.ix_(varies, varies)] = np.corrcoef(samples[:, varies].T)
-    return matrix
-
-
-def interval(samples: np.ndarray, mode: float) -> tuple[float, float]:
-    """The central LEVEL of samples (M,); from the end on beside which the mode lies, if it does."""
-    low, high = np.quantile(samples, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    if mode < low:
-        low, high = min(mode, samples.min()), np.quantile(samples, LEVEL)
-    elif mode > high:
-        low, high = np.quantile(samples, 1 - LEVEL), max(mode, samples.max())
-    return float(low), float(high)
-
-
-def _told(samples: np.ndarray, mode: float, unit: str) -> dict:
-    low, high = interval(samples, mode)
-    return {"value": mode, "low": low, "high": high, "unit": unit}
-
-
-def _clocks(identified: Identified) -> dict:
-    """Release and camera's delay of the first recording, with what its expansion leaves open."""
-    expansion, nuisances = identified.fit.expansions[0], identified.fit.nuisances[0]
-    change = expansion.nuisance_change
-    covariance = np.linalg.inv(identified.density.hessian)
-    spread = np.sqrt(
-        expansion.nuisance_spread**2 + np.einsum("id,de,ie->i", change, covariance, change)
-    )
-    release, camera = (SIMULATED.index(name) for name in ("release", "camera"))
-    time = identified.recordings[0].episode.release_time + nuisances[release]
-    wide = 1.645 * spread
-    return {
-        name: {"value": value, "low": value - wide[i], "high": value + wide[i], "unit": "s"}
-        for name, value, i in (
-            ("release_time", time, release),
-            ("camera_delay", -nuisances[camera] - identified.recordings[0].moved, camera),
-        )
-    }
-
-
-def _left(identified: Identified, number: int) -> dict:
-    """What a recording shows that the simulation does not, and what the others alone say of it."""
-    expansion, recording = identified.fit.expansions[number], identified.recordings[number]
-    entry: dict = {"force_rms": expansion.rms("force"), "held_rms": expansion.rms("held")}
-    entry |= {"recoil_rms": expansion.rms("recoil"), "pictures": expansion.pictures}
-    entry["source"] = recording.episode.metadata.get("input", {})
-    if len(identified.recordings) > 1:
-        entry["without_it"] = leave_one_out(identified, number)
-    return entry
-
-
-def leave_one_out(identified: Identified, number: int) -> dict:
-    """How the mode of all other evidence predicts the one left out, by their quadratics."""
-    expansion = identified.fit.expansions[number]
-    hessian, gradient = (
-        identified.fit.hessian - expansion.hessian,
-        identified.fit.gradient - expansion.gradient,
-    )
-    phi = np.clip(
-        identified.fit.phi + np.linalg.solve(hessian, gradient),
-        identified.coordinates.low,
-        identified.coordinates.high,
-    )
-    moved = phi - identified.fit.phi
-    worse = moved @ expansion.hessian @ moved - 2 * expansion.gradient @ moved
-    spread = np.sqrt(np.diag(np.linalg.inv(hessian)))
-    return {
-        "misfit": float(worse),
-        "moved": dict(zip(identified.coordinates.names, (moved / spread).tolist(), strict=True)),
-    }
-
-
-def _launched(identified: Identified) -> list[dict]:
-    launches, expansion = identified.launches, identified.fit.launches
-    if launches is None or expansion is None:
-        return []
-    density = identified.density
-    unlikely = without_each(expansion, density.hessian, density.gradient, identified.birge)
-    parts = launches.draws, launches.landings, expansion.left, unlikely
-    return [
-        {
-            "draw": draw.tolist(),
-            "landing": float(landing),
-            "left": None if gap != gap else float(gap),
-            "z_without_it": None if z != z else float(z),
-        }
-        for draw, landing, gap, z in zip(*parts, strict=True)
-    ]

@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from sling2sim2real.base.launches_file import COLUMNS, metres
+from sling2sim2real.base.launches_file import COLUMNS, FIT, LaunchRow, metres
+from sling2sim2real.identification.posterior.expansion import Linearised
 from sling2sim2real.simulator.launch import landing_gradient, launch
 from sling2sim2real.simulator.model import ClampedBand, LaunchSetup
 from sling2sim2real.simulator.parameters import Parameters
@@ -39,6 +41,19 @@ class Observed:
             metres("launch", name, "" if value is None else str(value))
 
 
+def observed(rows: Sequence[LaunchRow], usual: float) -> list[Observed]:
+    """Those launches of a table that are to fit.
+
+    Args:
+        usual: Standard deviation of a draw without one of its own [m].
+    """
+    return [
+        Observed(row.draw, usual if row.error is None else row.error, row.landing)
+        for row in rows
+        if row.use == FIT and row.landing is not None
+    ]
+
+
 @dataclass(frozen=True)
 class Evidence:
     """Launches of one band, and what launches them."""
@@ -49,45 +64,40 @@ class Evidence:
 
 @dataclass(frozen=True)
 class LaunchExpansion:
-    """-2 log p of N launches around coordinates (D,).
+    """N launches around coordinates (D,).
 
     Attributes:
-        left: Of each, log of measured over simulated landing; NaN where the simulated launch
+        log_ratio: Of each, log of measured over simulated landing; NaN where the simulated launch
             fails, or one from a draw beside it, shape (N,).
         spread: Standard deviation of that logarithm, shape (N,).
-        design: Change of `left` with the coordinates, over the spread, shape (D, N); 0 where a
-            launch fails, and in a coordinate whose finite difference fails.
+        design: Change of the simulated landing's logarithm with the coordinates, over the spread,
+            shape (D, N); 0 where a launch fails, and in a coordinate whose finite difference does.
     """
 
-    left: np.ndarray
+    log_ratio: np.ndarray
     spread: np.ndarray
     design: np.ndarray
 
     @property
     def failed(self) -> np.ndarray:
-        """Which launches fail, shape (N,); they count in nothing else here."""
-        return np.isnan(self.left)
+        """Which launches fail, shape (N,)."""
+        return np.isnan(self.log_ratio)
 
     @property
     def gap(self) -> np.ndarray:
-        """`left` over the spread, shape (N,)."""
-        return self.left / self.spread
+        """`log_ratio` over the spread, shape (N,)."""
+        return self.log_ratio / self.spread
 
-    @property
-    def misfit(self) -> float:
-        gap = self.gap[~self.failed]
-        return float(gap @ gap)
+    def of(self, which: np.ndarray) -> Linearised:
+        """Evidence of some launches, a mask (N,)."""
+        count = np.count_nonzero(which)
+        slopes = -self.design[:, which].T
+        return Linearised(self.gap[which], slopes, np.zeros((count, 0)), np.zeros(count))
 
-    @property
-    def hessian(self) -> np.ndarray:
-        """As of an `Expansion`, shape (D, D)."""
-        design = self.design[:, ~self.failed]
-        return design @ design.T
-
-    @property
-    def gradient(self) -> np.ndarray:
-        """As of an `Expansion`, shape (D,)."""
-        return self.design[:, ~self.failed] @ self.gap[~self.failed]
+    @cached_property
+    def landed(self) -> Linearised:
+        """Evidence of those that do not fail."""
+        return self.of(~self.failed)
 
 
 class LaunchLikelihood:
@@ -135,13 +145,13 @@ class LaunchLikelihood:
             np.tile(self.draws, (count, 1)),
             np.tile(number, count),
         ).reshape(count, -1)
-        left = np.log(self.landings / here)
+        log_ratio = np.log(self.landings / here)
         changes = (np.log(moved) - np.log(here)) / steps[:, None]  # (D, N)
         spread = np.hypot(slope * self.errors / here, TAPE / self.landings)
         design = changes / spread
-        left[~np.isfinite(left / spread)] = np.nan
+        log_ratio[~np.isfinite(log_ratio / spread)] = np.nan
         design[~np.isfinite(design)] = 0.0
-        return LaunchExpansion(left, spread, design)
+        return LaunchExpansion(log_ratio, spread, design)
 
     def remaining(self, parameters: Parameters, expansion: LaunchExpansion) -> np.ndarray:
         """Logs of measured over simulated landings of M parameters, over the spread: (M, N).
@@ -166,9 +176,9 @@ class LaunchLikelihood:
         setup, history = self.setup, self.setup.history
         if history:
             setup = replace(setup, history=replace(history, deepest=self.deepest[number]))
-        done = launch(self.sling, setup, parameters, draws, workers=self.workers)
-        failed = np.array([why is not None for why in done.failure])
-        return np.where(failed, np.nan, done.landing_y)
+        launched = launch(self.sling, setup, parameters, draws, workers=self.workers)
+        failed = np.array([why is not None for why in launched.failure])
+        return np.where(failed, np.nan, launched.landing_y)
 
 
 def without_each(
@@ -190,6 +200,6 @@ def without_each(
     for i in np.flatnonzero(~launches.failed):
         gap, slope = launches.gap[i], launches.design[:, i]
         rest = hessian - np.outer(slope, slope) / widening**2
-        left = gap - slope @ np.linalg.solve(rest, gradient - slope * gap / widening**2)
-        scores[i] = left / np.sqrt(1 + slope @ np.linalg.solve(rest, slope))
+        off = gap - slope @ np.linalg.solve(rest, gradient - slope * gap / widening**2)
+        scores[i] = off / np.sqrt(1 + slope @ np.linalg.solve(rest, slope))
     return scores

@@ -24,7 +24,7 @@ from sling2sim2real.identification.posterior.alignment import recoil_seen
 from sling2sim2real.identification.posterior.coordinates import LOSS
 from sling2sim2real.identification.posterior.expansion import Expansion, Form
 from sling2sim2real.identification.posterior.residuals import Residuals, Rule
-from sling2sim2real.simulator.interaction import Rollouts, interact
+from sling2sim2real.simulator.interaction import Rollouts, interact, with_recorded_pads
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
 
@@ -86,21 +86,6 @@ class Tolerances:
         return np.array([self.release, self.camera, self.hand])
 
 
-def opening_time(episode: Episode, sling: ClampedBand, friction: float) -> float:
-    """Time in which the simulated pads must open for the force to fall as fast as recorded [s].
-
-    From the slip on friction falls with the pads' force, which is gone after the opening time: the
-    held force is gone sooner, by its share of the friction of closed pads. An episode that does
-    not say how fast its force fell has the lab's own.
-    """
-    fall = episode.metadata.get("preprocessing", {}).get("release_fall")
-    if not fall:
-        return sling.finger_opening_time
-    last = np.flatnonzero(episode.time < episode.release_time)[-20:]
-    held = np.linalg.norm(episode.force[last], axis=1).max()
-    return float(np.clip(fall * 2 * friction * sling.grip_force / held, 5e-4, 0.05))
-
-
 def _picture_count(episode: Episode) -> int:
     """How many of the first pictures hold all that count."""
     return max(Rule().pictures(episode), default=-1) + 1
@@ -117,7 +102,7 @@ class Likelihood:
         episode, cutoff: As given.
         sling: As given, with the pads' opening time of this episode.
         tolerances: By the episode's metadata, until `with_wider_tolerances`.
-        moved: What was added to the camera's stamps before the fit [s].
+        camera_shift: What was added to the camera's stamps before the fit [s].
     """
 
     def __init__(
@@ -125,11 +110,11 @@ class Likelihood:
     ) -> None:
         """`friction` is what the method fixes, of the pads."""
         self.episode, self.cutoff = episode, cutoff
-        self.sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
-        self.tolerances, self.moved = Tolerances.of(episode), 0.0
+        self.sling = with_recorded_pads(sling, episode, friction)
+        self.tolerances, self.camera_shift = Tolerances.of(episode), 0.0
         end = np.searchsorted(episode.time, episode.release_time)
         place = episode.position[max(end - 5, 0) : end].mean(axis=0)
-        self._away = place / np.linalg.norm(place)
+        self._along_pull = place / np.linalg.norm(place)
         self._picture_count = _picture_count(episode)
 
     def aligned(self, parameters: Parameters) -> Likelihood:
@@ -142,11 +127,11 @@ class Likelihood:
         best = recoil_seen(self.episode, self.tolerances.camera, parameters, self.sling)
         if best is None:
             return self
-        moved = copy(self)
-        moved.moved = best
-        moved.episode = replace(self.episode, cloud_time=self.episode.cloud_time + best)
-        moved._picture_count = _picture_count(moved.episode)
-        return moved
+        aligned = copy(self)
+        aligned.camera_shift = best
+        aligned.episode = replace(self.episode, cloud_time=self.episode.cloud_time + best)
+        aligned._picture_count = _picture_count(aligned.episode)
+        return aligned
 
     def with_wider_tolerances(self, expansion: Expansion) -> Likelihood:
         """Copy with force and recoil as sure as the law can follow them.
@@ -169,7 +154,7 @@ class Likelihood:
             self.episode,
             release_time=self.episode.release_time + release,
             cloud_time=self.episode.cloud_time[: self._picture_count] + camera,
-            position=self.episode.position + hand * self._away,
+            position=self.episode.position + hand * self._along_pull,
         )
 
     def simulate(
@@ -183,11 +168,11 @@ class Likelihood:
         stamps = [episode.cloud_time + delay for delay in delays]
         every, places = np.unique(np.concatenate(stamps), return_inverse=True)
         seen = replace(episode, cloud_time=every)
-        done = interact(self.sling, seen, parameters, until=max(every, default=np.inf))
-        if why := next((reason for reason in done.failure if reason), None):
+        rollouts = interact(self.sling, seen, parameters, until=max(every, default=np.inf))
+        if why := next((reason for reason in rollouts.failure if reason), None):
             raise Failed(why)
         return [
-            replace(done, cloud_time=times, center_line=done.center_line[:, where])
+            replace(rollouts, cloud_time=times, center_line=rollouts.center_line[:, where])
             for times, where in zip(stamps, np.split(places, len(stamps)), strict=True)
         ]
 
@@ -254,21 +239,22 @@ class Likelihood:
         """
         seen = self.shifted(nuisances)
         until = max(seen.cloud_time, default=np.inf)
-        done = interact(self.sling, seen, parameters, until=until, workers=workers)
-        residuals = expansion.form.whitened(expansion.form.residuals(done))
+        rollouts = interact(self.sling, seen, parameters, until=until, workers=workers)
+        residuals = expansion.form.whitened(expansion.form.residuals(rollouts))
         priors = np.tile(self._priors(nuisances), (len(residuals), 1))
-        left = np.hstack([residuals, priors])
-        left = expansion.cleared(left - np.outer(loss - expansion.origin, expansion.uncounted))
-        left[[why is not None for why in done.failure]] = np.nan
-        return left
+        moved = np.outer(loss - expansion.origin, expansion.uncounted)
+        remaining = expansion.cleared(np.hstack([residuals, priors]) - moved)
+        remaining[[why is not None for why in rollouts.failure]] = np.nan
+        return remaining
 
     def _priors(self, nuisances: np.ndarray) -> np.ndarray:
         """Residuals of the simulated nuisances' own priors, shape (3,).
 
-        Of the camera's clock `moved` was taken beforehand, and belongs to what its prior judges.
+        Of the camera's clock `camera_shift` was taken beforehand, and belongs to what its prior
+        judges.
         """
-        moved = self.moved * (np.array(SIMULATED) == "camera")
-        return (nuisances + moved) / self.tolerances.simulated
+        shift = self.camera_shift * (np.array(SIMULATED) == "camera")
+        return (nuisances + shift) / self.tolerances.simulated
 
     def _binned(self, rollouts: Rollouts) -> Residuals:
         return Residuals(self.episode, self.sling, self.cutoff, rollouts.center_line[0])

@@ -197,7 +197,7 @@ class Residuals:
             drawn = episode.position[episode.time <= episode.release_time][-1]
         return np.linalg.norm(self.reference[self.picture, self.sling.middle] - drawn, axis=1)
 
-    def columns(self, left: np.ndarray) -> dict[str, np.ndarray]:
+    def columns(self, residuals: np.ndarray) -> dict[str, np.ndarray]:
         """How the residuals change with what moves all measured forces or points alike, (R,) each.
 
         force_bias_* [N], force_drift_* [N over the pull], force_gain: a share of the force,
@@ -205,13 +205,13 @@ class Residuals:
         about the camera [rad].
 
         Args:
-            left: Residuals (R,) of the rollout whose force a gain or a delay is of. With the
+            residuals: Shape (R,), of the rollout whose force a gain or a delay is of. With the
                 measured one a gain would explain a part of its noise, at the modulus's expense.
         """
         count, changes = len(self.samples), {}
         time = self.episode.time[self.samples]
         since = (time - time[0]) / (time[-1] - time[0])
-        force = self.episode.force[self.samples] - left[: 3 * count].reshape(3, count).T
+        force = self.episode.force[self.samples] - residuals[: 3 * count].reshape(3, count).T
         for name, course in (("delay", np.gradient(force, time, axis=0)), ("gain", force)):
             changes[f"force_{name}"] = np.append(course.T.ravel(), np.zeros(2 * len(self.picture)))
         arm = self.point - self.episode.camera

@@ -38,7 +38,7 @@ TAIL_END = 8.0  # standard deviations, where a tail has no numbers left
 
 @dataclass(frozen=True)
 class Remaining:
-    """What is left of all evidence around a fit, in standard deviations.
+    """Residuals that nuisances leave of all evidence around a fit, in standard deviations.
 
     Attributes:
         recordings, launches: As they were fitted.
@@ -52,18 +52,18 @@ class Remaining:
     workers: int
 
     def __call__(self, phi: np.ndarray) -> np.ndarray:
-        """What is left at coordinates (N, D), shape (N, R); NaN where a simulation fails."""
+        """Those at coordinates (N, D), shape (N, R); NaN where a simulation fails."""
         fitted, parameters = self.fitted, self.coordinates.parameters(phi)
         loss = phi[:, LOSS]
-        left = [
+        residuals = [
             recording.remaining(parameters, expansion, nuisances, loss, self.workers)
             for recording, expansion, nuisances in zip(
                 self.recordings, fitted.expansions, fitted.nuisances, strict=True
             )
         ]
         if self.launches and fitted.launches:
-            left.append(self.launches.remaining(parameters, fitted.launches))
-        return np.concatenate(left, axis=1)
+            residuals.append(self.launches.remaining(parameters, fitted.launches))
+        return np.concatenate(residuals, axis=1)
 
 
 def log_density(
@@ -147,14 +147,14 @@ class QuadraticSurface:
         centre: np.ndarray,
         scale: np.ndarray,
         phi: np.ndarray,
-        left: np.ndarray,
+        residuals: np.ndarray,
         weight: np.ndarray,
     ) -> QuadraticSurface:
-        """Fit residuals `left` (N, R) at coordinates (N, D), each of a weight, by least squares."""
+        """Fit residuals (N, R) at coordinates (N, D), each of a weight, by least squares."""
         terms = _terms((phi - centre) / scale)
         ridge = np.where(np.arange(terms.shape[1]) > len(centre), SURFACE_RIDGE, 1e-9)
         weighted = terms.T * weight
-        coefficients = np.linalg.solve(weighted @ terms + np.diag(ridge), weighted @ left)
+        coefficients = np.linalg.solve(weighted @ terms + np.diag(ridge), weighted @ residuals)
         return cls(centre, scale, coefficients @ coefficients.T)
 
     def misfit(self, phi: np.ndarray) -> np.ndarray:
@@ -187,7 +187,7 @@ def samples_of(remaining: Remaining, widening: float, seed: int) -> tuple[np.nda
     def log(phi: np.ndarray, misfit: np.ndarray) -> np.ndarray:
         return log_density(coordinates, phi, misfit, widening)
 
-    surface, phi, left, best, count = None, batch[:0], None, (batch, 0.0), 0
+    surface, phi, residuals, best, count = None, batch[:0], None, (batch, 0.0), 0
     while count < BATCHES:
         seen, count = remaining(batch), count + 1
         if surface is not None:
@@ -197,13 +197,13 @@ def samples_of(remaining: Remaining, widening: float, seed: int) -> tuple[np.nda
             if best[1] > ENOUGH_EFFECTIVE:
                 break
         phi = np.concatenate([phi, batch])
-        left = seen if left is None else np.concatenate([left, seen])
-        good = np.isfinite(left).all(axis=1)
+        residuals = seen if residuals is None else np.concatenate([residuals, seen])
+        good = np.isfinite(residuals).all(axis=1)
         if not good.any():
             break
-        logs = log(phi[good], np.sum(left[good] ** 2, axis=1))
+        logs = log(phi[good], np.sum(residuals[good] ** 2, axis=1))
         weight = np.exp(SURFACE_TEMPER * (logs - logs.max()))
-        surface = QuadraticSurface.fitted(density.phi, scale, phi[good], left[good], weight)
+        surface = QuadraticSurface.fitted(density.phi, scale, phi[good], residuals[good], weight)
         batch = _evolved(lambda at, by=surface: log(at, by.misfit(at)), batch, random)
     return *best, count
 

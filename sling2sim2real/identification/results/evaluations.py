@@ -9,15 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.files import read_table, replacing
+from sling2sim2real.base.files import column, read_table, replacing
 from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.parameters import Parameters
 
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from sling2sim2real.identification.objective.evaluate import Evaluation
 
 TERMS = ("geom", "force", "work")  # of the paper's loss
+UNIT = "unit_"  # before the name of an axis: its coordinate in the unit cube
 
 
 @dataclass
@@ -34,6 +34,14 @@ class Evaluations:
     method: str
     names: tuple[str, ...]
     _parts: list[pa.Table] = field(default_factory=list)
+
+    @property
+    def _schema(self) -> pa.Schema:
+        text, number, counter = pa.string(), pa.float64(), pa.int32()
+        fields = {"method": text, "phase": text, "generation": counter, "solver": counter}
+        axes = [UNIT + name for name in self.names] + [*self.names]
+        fields |= dict.fromkeys((*axes, *TERMS, "total"), number)
+        return pa.schema([*fields.items(), ("failure", text)])
 
     def add(
         self,
@@ -46,59 +54,54 @@ class Evaluations:
         """Append a batch; `solver` says who asked for each point, shape (N,)."""
         count = len(evaluation.total)
         columns = {
-            "method": pa.array([self.method] * count, pa.string()),
-            "phase": pa.array([phase] * count, pa.string()),
-            "generation": pa.array([generation] * count, pa.int32()),
-            "solver": pa.array([None] * count if solver is None else solver, pa.int32()),
+            "method": [self.method] * count,
+            "phase": [phase] * count,
+            "generation": [generation] * count,
+            "solver": [None] * count if solver is None else solver,
+            **{UNIT + name: evaluation.unit[:, k] for k, name in enumerate(self.names)},
+            **{name: evaluation.theta[:, k] for k, name in enumerate(self.names)},
+            **evaluation.terms,
+            "total": evaluation.total,
+            "failure": evaluation.failure,
         }
-        for prefix, values in (("unit_", evaluation.unit), ("", evaluation.theta)):
-            for name, column in zip(self.names, values.T, strict=True):
-                columns[prefix + name] = pa.array(column, pa.float64())
-        for name in TERMS:
-            columns[name] = pa.array(evaluation.terms[name], pa.float64())
-        columns["total"] = pa.array(evaluation.total, pa.float64())
-        columns["failure"] = pa.array(evaluation.failure, pa.string())
-        self._parts.append(pa.table(columns))
+        self._parts.append(pa.table(columns, schema=self._schema))
 
     @property
     def table(self) -> pa.Table:
-        if not self._parts:  # the columns of no rows
-            points, values = np.zeros((0, len(self.names))), np.zeros(0)
-            terms = dict.fromkeys(TERMS, values)
-            nothing: Any = SimpleNamespace(
-                unit=points, theta=points, terms=terms, total=values, failure=[]
-            )
-            self.add(nothing, phase="", generation=0)
-        return pa.concat_tables(self._parts).combine_chunks()
+        parts = self._parts or [self._schema.empty_table()]
+        return pa.concat_tables(parts).combine_chunks()
 
     @property
     def unit(self) -> np.ndarray:
         """Shape (N, D)."""
-        return np.stack([self.table[f"unit_{name}"].to_numpy() for name in self.names], axis=1)
+        return np.stack([column(self.table, UNIT + name) for name in self.names], axis=1)
 
     @property
     def total(self) -> np.ndarray:
         """Shape (N,); +inf where failed."""
-        return self.table["total"].to_numpy()
+        return column(self.table, "total")
 
     def save(self, path: Path) -> None:
         with replacing(path) as temporary:
             pq.write_table(self.table, temporary)
 
     @classmethod
-    def load(cls, method: str, names: tuple[str, ...], *paths: Path) -> Evaluations:
+    def load(cls, method: str, *paths: Path) -> Evaluations:
         """Read files that `save` wrote, one after the other."""
-        return cls(method, names, [read_table(path) for path in paths])
+        tables = [read_table(path) for path in paths]
+        axes = (name for name in tables[0].column_names if name.startswith(UNIT))
+        return cls(method, tuple(name.removeprefix(UNIT) for name in axes), tables)
 
     def followed_by(self, other: Evaluations) -> Evaluations:
         """These rows, then those of `other`."""
         return Evaluations(self.method, self.names, [self.table, other.table])
 
     def of_phase(self, phase: str) -> Evaluations:
-        """The rows of one phase alone."""
+        """The rows of one phase alone, by slices: a table's own filter imports pandas."""
         table = self.table
-        chosen = pa.array(table["phase"].to_numpy() == phase)
-        return Evaluations(self.method, self.names, [table.filter(chosen)])
+        rows = [row for row, name in enumerate(table["phase"].to_pylist()) if name == phase]
+        parts = [table.slice(row, 1) for row in rows] or [table.slice(0, 0)]
+        return Evaluations(self.method, self.names, parts)
 
     def best_parameters(self, law: str) -> Parameters:
         """One sample, of the best row. Raises UserError as `best_row`."""
@@ -122,7 +125,7 @@ def theta_content(evaluations: Evaluations, band: str, entries: dict) -> dict:
 
     Args:
         evaluations: Everything that a search evaluated; a density's mode is a phase of its own.
-        entries: What else the search says of θ (identify/results/confidence_file.py).
+        entries: What else the search says of θ (`PosteriorFile`).
     """
     mode = evaluations.of_phase(POSTERIOR)
     chosen = mode if len(mode.total) else evaluations

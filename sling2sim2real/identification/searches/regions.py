@@ -16,6 +16,7 @@ from pydantic import model_validator
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_json
 from sling2sim2real.base.schema import JsonRecord, Name, read_json, refusal
+from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.settings.identification import MethodParams, OptimizerParams
 
 COVARIANCE_RIDGE = 1e-3  # of the mean variance, added to every variance
@@ -39,34 +40,27 @@ class Region:
     members: list[int]
 
 
-def regions_asked(method_params: MethodParams, optimizer: OptimizerParams) -> int:
-    """How many regions params.yaml's `methods.<name>` and `optimizer` ask for."""
-    return method_params.k_top or optimizer.k_top
-
-
 def regions_of(
-    method_params: MethodParams, optimizer: OptimizerParams, evaluations
-) -> tuple[list[Region], int]:
-    """Where a method's refinement begins, and how many regions were asked for.
+    method_params: MethodParams, optimizer: OptimizerParams, evaluations: Evaluations
+) -> list[Region]:
+    """Where a method's refinement begins.
 
     Args:
         method_params: params.yaml's `methods.<name>`.
         optimizer: params.yaml's `optimizer`.
-        evaluations: The `Evaluations` of its exploration, on its free axes.
+        evaluations: Of its exploration, on its free axes.
 
     Raises:
         UserError: As `find_regions`.
     """
-    count = regions_asked(method_params, optimizer)
-    regions = find_regions(
+    return find_regions(
         evaluations.unit,
         evaluations.total,
-        k_top=count,
+        k_top=method_params.k_top or optimizer.k_top,
         k_nn=optimizer.k_nn,
         delta=optimizer.delta,
         covariance=method_params.covariance,
     )
-    return regions, count
 
 
 def find_regions(
@@ -148,14 +142,14 @@ class RegionsFile(JsonRecord):
         return self
 
 
-def save_regions(path: Path, names: tuple[str, ...], regions: list[Region], requested: int) -> None:
-    """Write a `RegionsFile` with its axes' `names`, and how many regions were asked for."""
+def save_regions(path: Path, names: tuple[str, ...], regions: list[Region]) -> None:
+    """Write a `RegionsFile` with its axes' `names`."""
     clusters = [
         {"mu": region.mu.tolist(), "Sigma": region.sigma.tolist(), "loss": region.loss}
         | {"members": region.members}
         for region in regions
     ]
-    write_json(path, {"names": list(names), "asked": requested, "clusters": clusters})
+    write_json(path, {"names": list(names), "clusters": clusters})
 
 
 def load_regions(path: Path) -> tuple[list[Region], list[str]]:

@@ -8,7 +8,7 @@ import pytest
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.clamps import calibrate_clamps, nominal_young, slack_part
-from sling2sim2real.identification.results.mounting import Mounting
+from sling2sim2real.identification.results.theta import Mounting
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
 from tests.identification.objective.pulls import PARAMS, pulled, sling_of

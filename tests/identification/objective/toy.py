@@ -71,7 +71,7 @@ def episode(samples: int = 60, frames: int = 20, **changes) -> Episode:
 def loss_of(of: Episode, **options) -> EpisodeLoss:
     """The loss of the straight band; all terms weigh alike unless `options` say otherwise."""
     options = {"weights": dict.fromkeys(TERMS, 1.0), "cutoff": CUTOFF, **options}
-    return EpisodeLoss(of, radius=RADIUS, rest_length=LENGTH, **options)
+    return EpisodeLoss(of, radius=RADIUS, rest_edges=SLING.edge_lengths, **options)
 
 
 def rollouts(of: Episode, count: int = 1, shift=(0, 0, 0), force=(0, 0, 0)) -> SimpleNamespace:

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from sling2sim2real.identification.posterior import fit as module
+from sling2sim2real.identification.posterior.confidence import leave_one_out
 from sling2sim2real.identification.posterior.expansion import Expansion
 from sling2sim2real.identification.posterior.fit import PASSES, NoFit, fit, widened
-from sling2sim2real.identification.posterior.identify import birge_ratio, leave_one_out
+from sling2sim2real.identification.posterior.identify import birge_ratio
 from sling2sim2real.identification.posterior.launches import LaunchExpansion
 from sling2sim2real.identification.posterior.sampling import samples_around
 from tests.identification.posterior.toy import SIZE, TIME, Curve, curve, least, slopes, space
@@ -125,7 +126,7 @@ def test_the_fit_keeps_the_launches_of_its_mode():
     first, second = curves(2)
     launches = Launches(second)
     result = fit([first], space(), START, launches=launches)
-    np.testing.assert_array_equal(result.launches.left, second.seen - curve(result.phi))
+    np.testing.assert_array_equal(result.launches.log_ratio, second.seen - curve(result.phi))
 
 
 def test_a_step_into_failure_is_taken_shorter():

@@ -43,7 +43,7 @@ def test_knowing_some_exactly(model) -> None:
     left = conditioned(COVARIANCE, [1, 3], [0, 2])
     spread = np.einsum("td,de,te->t", GRADIENT[:, [0, 2]], left, GRADIENT[:, [0, 2]])
     expected = 1.645 * np.sqrt(spread + model.draw**2)
-    half_widths = model.after(model.exact(["elasticity_damping", "air_drag", "unknown"]))
+    half_widths = model.after(model.known("elasticity_damping", "air_drag", "unknown"))
     np.testing.assert_allclose(half_widths, expected, rtol=1e-9)
 
 

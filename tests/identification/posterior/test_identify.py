@@ -8,7 +8,7 @@ import pytest
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.signal import cutoff_hz
-from sling2sim2real.identification.posterior import coordinates, identify
+from sling2sim2real.identification.posterior import confidence, coordinates, identify
 from sling2sim2real.identification.posterior.coordinates import Coordinates
 from sling2sim2real.identification.posterior.fit import SETTLED_SIZE
 from sling2sim2real.identification.posterior.launches import LaunchLikelihood, Observed
@@ -68,16 +68,18 @@ def test_what_moves_a_whole_picture_of_the_recoil_counts_as_one_error(first) -> 
     bins = np.flatnonzero(seen.picture == picture)
     gone = seen.travelled()[bins[0]]
     for signs, repeated in ((1.0, np.sqrt(len(bins))), ((-1.0) ** np.arange(len(bins)), 1.0)):
-        left = np.zeros_like(expansion.left)
+        left = np.zeros_like(expansion.residual)
         left[count + bins] = 2e-3 * signs * weight[count + bins]
-        discrepancy = replace(expansion, left=left).recoil_discrepancy
+        discrepancy = replace(expansion, residual=left).recoil_discrepancy
         assert discrepancy == pytest.approx(2e-3 / gone * repeated, rel=0.25)
-        wider = first.recordings[0].with_wider_tolerances(replace(expansion, left=left)).tolerances
+        wider = (
+            first.recordings[0].with_wider_tolerances(replace(expansion, residual=left)).tolerances
+        )
         assert wider.recoil == max(first.recordings[0].tolerances.recoil, discrepancy)
 
 
 def told_of(result) -> dict:
-    return identify.confidence(result)
+    return confidence.confidence(result)
 
 
 def test_the_truth_is_found_where_no_prior_pulls(exact, monkeypatch):
@@ -123,7 +125,7 @@ def test_alike_recordings_agree(both):
 
 def test_what_is_written_is_a_theta_file(first, tmp_path):
     path = tmp_path / "posterior.json"
-    content = {"band": "known", **identify.theta_entries(first)}
+    content = {"band": "known", **confidence.theta_entries(first)}
     content["confidence"] = told_of(first)
     content |= {"loss": dict.fromkeys(("geom", "force", "work", "total"), 1.0), "rollouts": 1}
     path.write_text(json.dumps(content, allow_nan=False))
@@ -139,13 +141,13 @@ def test_the_theta_file_is_of_the_band_after_all_that_stretched_it(first):
     episode = first.recordings[0].episode
     deeper = replace(episode, position=1.1 * episode.position)
     history = identify.recorded_history(SLING, [episode])
-    assert identify.theta_entries(first)["history"] == vars(history)
+    assert confidence.theta_entries(first)["history"] == vars(history)
     for two in ([episode, deeper], [deeper, episode]):
         assert identify.recorded_history(SLING, two).deepest == pytest.approx(1.1 * history.deepest)
     setup = LaunchSetup.of(PARAMS.setup, PARAMS.sling, history)
     for draw, deepest in (((-0.1, -0.1), history.deepest), ((-0.6, -0.3), np.hypot(0.6, 0.3))):
         launches = LaunchLikelihood([Observed(draw, 0.001, 3.0)], SLING, setup)
-        written = identify.theta_entries(replace(first, launches=launches))
+        written = confidence.theta_entries(replace(first, launches=launches))
         assert written["history"] == vars(replace(history, deepest=float(deepest)))
 
 
@@ -170,9 +172,9 @@ def test_constant_coordinates_correlate_with_nothing():
     samples = np.column_stack([some, np.full(200, 0.1), np.full(200, 0.3)])
     expected = np.eye(4)
     expected[:2, :2] = np.corrcoef(some.T)
-    np.testing.assert_allclose(identify.correlation(samples), expected)
-    np.testing.assert_array_equal(identify.correlation(samples[:, 2:]), np.eye(2))
-    np.testing.assert_array_equal(identify.correlation(samples[:, 1:3]), np.eye(2))
+    np.testing.assert_allclose(confidence.correlation(samples), expected)
+    np.testing.assert_array_equal(confidence.correlation(samples[:, 2:]), np.eye(2))
+    np.testing.assert_array_equal(confidence.correlation(samples[:, 1:3]), np.eye(2))
 
 
 @pytest.mark.slow

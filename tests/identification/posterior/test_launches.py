@@ -46,12 +46,12 @@ def test_the_update_is_the_linear_gaussian_one() -> None:
     here = y**2 * (1 - z)
     spread = np.hypot(error * np.hypot(2 / y, 1 / (1 - z)), TAPE / landing)
     gap, design = np.log(landing / here) / spread, np.array([1.0, 0.5]) / spread
-    assert told.left == pytest.approx([np.log(landing / here)])
-    assert told.misfit == pytest.approx(gap**2, rel=1e-3)
-    np.testing.assert_allclose(told.hessian, np.outer(design, design), rtol=1e-3)
-    np.testing.assert_allclose(told.gradient, gap * design, rtol=1e-3)
+    assert told.log_ratio == pytest.approx([np.log(landing / here)])
+    assert told.landed.misfit == pytest.approx(gap**2, rel=1e-3)
+    np.testing.assert_allclose(told.landed.hessian, np.outer(design, design), rtol=1e-3)
+    np.testing.assert_allclose(told.landed.gradient, gap * design, rtol=1e-3)
     prior = np.diag([4.0, 25.0])
-    moved = np.linalg.solve(prior + told.hessian, told.gradient)
+    moved = np.linalg.solve(prior + told.landed.hessian, told.landed.gradient)
     variance = np.array([1 / 4, 1 / 25])
     gain = variance * [1, 0.5] / (variance @ [1, 0.25] + spread**2)  # Kalman's
     np.testing.assert_allclose(moved, gain * np.log(landing / here), rtol=1e-3)
@@ -72,17 +72,19 @@ def test_two_launches_tell_more_than_one_and_their_order_nothing() -> None:
     first, second = expanded(near), expanded(far)
     for both in (expanded(near, far), expanded(far, near)):
         for name in ("misfit", "hessian", "gradient"):
-            added = getattr(first, name) + getattr(second, name)
-            np.testing.assert_allclose(getattr(both, name), added, rtol=1e-6)
-        assert np.trace(both.hessian) > max(np.trace(first.hessian), np.trace(second.hessian))
+            added = getattr(first.landed, name) + getattr(second.landed, name)
+            np.testing.assert_allclose(getattr(both.landed, name), added, rtol=1e-6)
+        assert np.trace(both.landed.hessian) > max(
+            np.trace(first.landed.hessian), np.trace(second.landed.hessian)
+        )
 
 
 def test_a_launch_that_fails_at_the_expansion_is_named_and_pulls_nowhere() -> None:
     good, bad = Observed((-0.5, -0.2), 0.001, 0.31), Observed((-0.5, 0.2), 0.001, 0.31)
     alone, both = expanded(good), expanded(good, bad)
-    assert both.failed.tolist() == [False, True] and np.isnan(both.left[1])
+    assert both.failed.tolist() == [False, True] and np.isnan(both.log_ratio[1])
     for name in ("misfit", "hessian", "gradient"):
-        np.testing.assert_allclose(getattr(both, name), getattr(alone, name))
+        np.testing.assert_allclose(getattr(both.landed, name), getattr(alone.landed, name))
 
 
 def test_a_finite_difference_that_fails_takes_no_misfit_away(monkeypatch) -> None:
@@ -97,7 +99,7 @@ def test_a_finite_difference_that_fails_takes_no_misfit_away(monkeypatch) -> Non
     sound = expanded(launched)
     monkeypatch.setattr(launches, "launch", fragile)
     told = expanded(launched)
-    assert told.misfit == sound.misfit and not told.failed.any()
+    assert told.landed.misfit == sound.landed.misfit and not told.failed.any()
     np.testing.assert_array_equal(told.design[:, 0], sound.design[:, 0] * [1, 0])
 
 
@@ -124,10 +126,10 @@ def test_each_launch_is_of_the_band_that_the_launches_before_it_left(monkeypatch
         setup = replace(recorded, history=LaunchHistory(1.0, 0.5, before))
         single = LaunchLikelihood([observation], None, setup)
         each.append(single.expand(lambda phi: phi, np.zeros(2), STEPS))
-    np.testing.assert_allclose(told.left, np.concatenate([part.left for part in each]))
+    np.testing.assert_allclose(told.log_ratio, np.concatenate([part.log_ratio for part in each]))
     np.testing.assert_allclose(told.design, np.hstack([part.design for part in each]), rtol=1e-9)
-    assert told.misfit == pytest.approx(sum(part.misfit for part in each))
-    assert np.ptp(told.left) > 0.1
+    assert told.landed.misfit == pytest.approx(sum(part.landed.misfit for part in each))
+    assert np.ptp(told.log_ratio) > 0.1
 
 
 def test_launches_run_on_as_many_threads_as_the_fit_has(monkeypatch) -> None:
@@ -147,8 +149,8 @@ def test_at_the_truth_nothing_pulls() -> None:
     phi = (0.2, -0.1)
     landing = float(toy(None, None, np.array([phi]), np.array([[-0.5, -0.2]]), 1).landing_y[0])
     told = expanded(Observed((-0.5, -0.2), 0.001, landing), phi=phi)
-    assert told.misfit == pytest.approx(0, abs=1e-12)
-    np.testing.assert_allclose(told.gradient, 0, atol=1e-6)
+    assert told.landed.misfit == pytest.approx(0, abs=1e-12)
+    np.testing.assert_allclose(told.landed.gradient, 0, atol=1e-6)
 
 
 def test_a_launch_is_held_against_what_all_else_predicts() -> None:
@@ -156,19 +158,21 @@ def test_a_launch_is_held_against_what_all_else_predicts() -> None:
     near, far = Observed((-0.5, -0.2), 0.001, 0.34), Observed((-0.6, -0.1), 0.0, 0.4)
     prior = np.diag([40.0, 250.0])
     both = expanded(near, far)
-    scores = without_each(both, prior + both.hessian, both.gradient)
+    scores = without_each(both, prior + both.landed.hessian, both.landed.gradient)
     for index, (observation, rest) in enumerate(((near, far), (far, near))):
         others, alone = expanded(rest), expanded(observation)
-        covariance = np.linalg.inv(prior + others.hessian)
+        covariance = np.linalg.inv(prior + others.landed.hessian)
         slope = alone.design[:, 0]
-        predicted = alone.gap[0] - slope @ covariance @ others.gradient
+        predicted = alone.gap[0] - slope @ covariance @ others.landed.gradient
         assert scores[index] == pytest.approx(
             predicted / np.sqrt(1 + slope @ covariance @ slope), rel=1e-6
         )
-    wider = without_each(both, prior + both.hessian / 9, both.gradient / 9, widening=3.0)
+    wider = without_each(
+        both, prior + both.landed.hessian / 9, both.landed.gradient / 9, widening=3.0
+    )
     assert np.all(np.abs(wider) < np.abs(scores))
     failed = expanded(near, Observed((-0.5, 0.2), 0.001, 0.31))
-    assert np.isnan(without_each(failed, prior + failed.hessian, failed.gradient)[1])
+    assert np.isnan(without_each(failed, prior + failed.landed.hessian, failed.landed.gradient)[1])
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 
 from sling2sim2real.identification.posterior.coordinates import Coordinates
 from sling2sim2real.identification.posterior.launches import LaunchLikelihood, Observed
-from sling2sim2real.identification.results.mounting import load_sling
+from sling2sim2real.identification.results.theta import load_sling
 from sling2sim2real.simulator.launch import launch
 from sling2sim2real.simulator.model import LaunchHistory, LaunchSetup
 from sling2sim2real.simulator.parameters import Parameters
@@ -32,7 +32,7 @@ def summary(params):
         told = LaunchLikelihood(observed, sling, setup).expand(
             coordinates.parameters, phi, coordinates.steps
         )
-        return precision + told.hessian, told.gradient
+        return precision + told.landed.hessian, told.landed.gradient
 
     precision = np.diag(coordinates.precision + 1e2)  # as if recordings showed each within 0.1
     return coordinates.names, precision, by

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,7 +32,8 @@ def target(seen=residuals, slopes=SLOPES) -> SimpleNamespace:
     coordinates = replace(space(), precision=precision)
     slope = np.pad(slopes, ((0, 0), (0, 1))) / SIZE
     hessian = slope.T @ slope + np.diag(coordinates.precision)
-    there = AT * SIZE, np.zeros((0, 3)), [], None, np.zeros(0), np.zeros((0, 3)), np.zeros(0)
+    nothing: Any = None  # else
+    there = AT * SIZE, np.zeros((0, 3)), [], None, nothing
     fitted = Fit(*there, hessian, gradient=np.zeros(3), steps=1, settled=True)
 
     class Evidence(SimpleNamespace):

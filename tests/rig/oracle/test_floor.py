@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pipeline.report.results import load_floor
+from pipeline.report.data import load_floor
 from rig.oracle.floor import errors_of, trial_numbers
 from sling2sim2real.base.errors import UserError
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from pipeline.report.results import load_floor
+from pipeline.report.data import load_floor
 from stages import floor
 from tests.project import DEFAULTS
 

@@ -1,1 +1,0 @@
-"""The chapters of the report, in its order."""

@@ -53,7 +53,7 @@ def lay_out(folder: Path) -> None:
 
 def commands() -> str:
     """The help of each command of `sling`."""
-    (subs,) = (action.choices for action in parser()._actions if action.choices)
+    subs = next(vars(action)["choices"] for action in parser()._actions if action.choices)
     return "".join(
         f"\n## sling {name}\n\n```\n{command.format_help()}```\n" for name, command in subs.items()
     )

@@ -58,7 +58,10 @@ class Spool:
         """Keep some bytes; what gives them back."""
         place, self._size = self._size, self._size + len(data)
         self._file.write(data.data)
-        return lambda: np.frombuffer(os.pread(self._file.fileno(), len(data), place), np.uint8)
+        return partial(self._get, place, len(data))
+
+    def _get(self, place: int, size: int) -> np.ndarray:
+        return np.frombuffer(os.pread(self._file.fileno(), size, place), np.uint8)
 
 
 class Unreadable(str):
@@ -380,12 +383,7 @@ def read_calibration(message: Message) -> Reading:
     distortion = np.array(first_of(message, "d", "D"), float).ravel()
     frame = frame_of(message)
     camera = Camera(int(message.width), int(message.height), matrix, distortion, frame)
-    across, down = (max(1, int(getattr(message, f"binning_{axis}", 1))) for axis in "xy")
-    roi = getattr(message, "roi", None)
-    sides = (roi.x_offset, roi.y_offset, roi.width, roi.height) if roi else (0, 0, 0, 0)
-    x, y, width, height = map(int, sides)
-    model = str(message.distortion_model)
-    value = Calibration(camera, model, rectified, (across, down), (x, y, width, height))
+    value = Calibration(camera, str(message.distortion_model), rectified)
     return _reading(message, value)
 
 

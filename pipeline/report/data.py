@@ -19,8 +19,8 @@ from pipeline.layout import Layout
 from pipeline.params import Params
 from pipeline.params.run import Pair
 from pipeline.report.paper import METHOD
+from sling2sim2real.base.files import NotMade, made
 from sling2sim2real.base.launches_file import CHECK, read_launches
-from sling2sim2real.base.layout import NotMade, made
 from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.base.target import TARGET_AREA
 from sling2sim2real.drawing.styles import Styles, styles

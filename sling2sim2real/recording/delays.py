@@ -4,17 +4,18 @@
 |---|---|---|
 | pose | the tool's inertia, where the sensor feels it | 1 ms |
 | pose, against the release | the hand that starts back when the band lets it go | 0.1 ms |
+| camera, against the pose | the hand in the pictures | 0.1 ms |
 | camera | which picture is the first without the drawn band | a third of a picture's time |
 
-Where the hand starts back with a speed that jumps, its start is known to 1 ms only. What is left of
-the camera's delay the fit finds, by the band's recoil.
+Where the hand starts back with a speed that jumps, its start is known to 1 ms only.
 
-Inertia is looked for where the hand moves freely: the events are found first, with the stamps as
-they were recorded. That they are off by such a delay does no harm, for what is close to them is
-left out. Of a pull with other stamps, motion and grasp are estimated anew.
+Inertia and hand are looked for where the hand moves freely, or draws the band: the events are found
+first, with the stamps as they were recorded. That they are off by such a delay does no harm, for
+what is close to them is left out. Of a pull with other stamps, motion and grasp are estimated anew.
 
 A robot that starts back by itself, shortly before or after the release, looks like a late or early
-pose. A delay that was given tells them apart; else both stay possible, which is said.
+pose. The camera, tied to the pose by the hand and to the force by the pictures of the release,
+tells some of them apart; a delay that was given does; else both stay possible, which is said.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from typing import TypeVar
 import numpy as np
 
 from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.camera_delay import camera_delay
 from sling2sim2real.recording.events import Pull
 from sling2sim2real.recording.force import ToolInertia, estimate_tool_inertia
 from sling2sim2real.recording.release_pictures import ReleasePictures, release_pictures
@@ -53,7 +55,7 @@ class Estimate:
         source: "setup", "estimated" or "not seen".
         applied: Whether the stamps are corrected by it.
         left: Standard deviation of what the stamps may still be late [s].
-        against: What the estimate is against: "force", or "release", as the force shows it.
+        against: What the estimate is against: "force"; "release", as the force shows it; or "pose".
         given: What was given of it [s]; None where nothing was.
         alone: Only the hand that starts back tells it, as a motion of the robot's own would.
     """
@@ -119,6 +121,9 @@ def correct_delays(pull: Pull, params: Settings) -> tuple[Pull, Delays]:
 
     Given delays are taken off first, when the recording is read; what it shows of the rest is
     estimated as where none was given.
+
+    The camera's is estimated against the pose, after that was corrected, then against the release.
+    Where the pictures of the release are off, the hand is looked for from there on.
     """
     given, off = params.episode.delays, pull.recording.late  # what reading it took off already
     pull = pull.shifted((given.pose or 0.0) - off.get("pose", 0.0))
@@ -132,16 +137,67 @@ def correct_delays(pull: Pull, params: Settings) -> tuple[Pull, Delays]:
         inertia = replace(inertia, delay=left if sure else 0.0)
     camera = Estimate.unseen(given.camera, GIVEN_CAMERA, UNSEEN_CAMERA)
     release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
-    if release is not None and release.beyond:
-        if not release.off(pose.rest):  # a force's clock that is off explains both
-            pose = replace(pose, alone=False)
+    by_hand = _by_hand(pull, release)
+    if by_hand is not None:
+        camera = Estimate.seen(*by_hand, against="pose", given=given.camera)
+    if camera.rest:
+        pull = pull.shifted(camera=camera.rest)
+        release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
+    allowed = 0.0 if by_hand is None else SIGMAS * (camera.error or 0.0)
+    if pose.alone and release is not None:
+        by_itself = _by_itself(pose.rest, by_hand and by_hand[0], camera.rest, release, allowed)
+        pose = replace(pose, alone=by_itself is None)
+        if by_itself and by_hand is not None:
+            pull = pull.shifted(-pose.rest, -camera.rest)
+            rest = by_hand[0] - pose.rest
+            camera = Estimate.seen(rest, by_hand[1], against="pose", given=given.camera)
+            pose = Estimate(left=UNSEEN_POSE)
+            pull = pull.shifted(camera=camera.rest)
+            release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
+    if release is not None and release.beyond > allowed:
+        if by_hand is not None:
+            after = f"{1e3 * release.middle:+.0f} ± {1e3 * release.error:.0f} ms"
+            conflict = conflict or (
+                f"the hand in the pictures goes with the pose, but the band is let go {after} after"
+                " the force falls"
+            )
         pull = pull.shifted(camera=release.middle)
-        value, error = (given.camera or 0.0) + release.middle, release.error
+        value, error = (given.camera or 0.0) + camera.rest + release.middle, release.error
         camera = Estimate(value, error, "estimated", True, error, given=given.camera)
-    elif release is not None:
+    elif release is not None and by_hand is None:
         left = float(np.hypot(release.middle, release.error))
         camera = replace(camera, left=left if given.camera is None else min(left, GIVEN_CAMERA))
     return pull, Delays(pose, camera, inertia, release, conflict)
+
+
+def _by_hand(pull: Pull, release: ReleasePictures | None) -> tuple[float, float] | None:
+    """The camera's delay against the pose and its standard error [s]; None where nothing tells.
+
+    Args:
+        release: From which on it is looked for.
+    """
+    near = release.middle if release is not None and release.beyond else 0.0
+    matched = _or_none(lambda: camera_delay(pull.shifted(camera=near)))
+    return (near + matched[0], matched[1]) if matched and matched[1] <= MOST_ERROR else None
+
+
+def _by_itself(
+    late: float, camera: float | None, taken: float, release: ReleasePictures, allowed: float
+) -> bool | None:
+    """Whether the hand starts back `late` [s] by itself, not by the pose's clock; None: who knows.
+
+    Args:
+        camera: Its delay [s] against a pose that is put right by `late`; None where no hand tells.
+        taken: What of it the stamps are corrected by [s].
+        release: With these stamps.
+        allowed: By which a delay may be outside of what `release` allows [s].
+    """
+    if release.never:
+        return None
+    if camera is None:  # a force's clock that is off explains both
+        return False if release.beyond and not release.off(late) else None
+    clock, itself = (release.off(camera - taken - shift) <= allowed for shift in (0.0, late))
+    return itself if itself != clock else None
 
 
 def _of_pose(pull: Pull, inertia: ToolInertia | None, given: float | None) -> tuple[Estimate, str]:

@@ -80,7 +80,7 @@ class ParameterBoxes(create_model("_ParameterBoxes", __base__=Section, **_BOXES)
 
 
 class LossParams(Section):
-    chamfer: Literal["symmetric", "clouds"] = "symmetric"
+    chamfer: Literal["symmetric", "clouds"] = "clouds"
     median_window: Annotated[int, Range(1, 101)] = 7
 
     @model_validator(mode="after")
@@ -156,7 +156,7 @@ Bounds = Annotated[tuple[Value, Value], LIST]
 class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
-    law: Law = "neo_hookean"
+    law: Law = "corotated"
     search: Annotated[str, _one_of(SEARCHES, "function")] = "multistart"
     engine: Annotated[str, _one_of(ENGINES, "function")] = "sling"
     settings: dict[str, Setting] = {}

@@ -82,7 +82,7 @@ def test_each_mask_counts_for_its_own_picture_and_no_other(mine, checked, by_fol
 
 
 def test_a_late_camera_does_not_change_the_names(masked, params, by_folder) -> None:
-    recording = read_recording(masked, params.setup).shifted(camera=-0.1)
+    recording = read_recording(masked, params.setup).shifted(camera=-0.015)
     done = process(part_of(recording, params), params.bands["band1"], by_folder)
     assert done.delays.camera.applied
     assert done.whole.clouds.pixels.min() > 0

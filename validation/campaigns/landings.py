@@ -283,8 +283,8 @@ def sentence(content: dict) -> list[str]:
         f"On {len(bands)} held-out virtual rubbers, with dips, predictions are off by {size:.1f} %"
         f" of the distance (mean over recordings; {abs(worst):.1f} % at worst), and {inside:.0f} %"
         f" of the launches land in 90 % intervals, which are {width:.0f} % wide. By the paper's"
-        f" pull they are off by {ours:.1f} %, the paper's method by {theirs:.1f} %; `posterior` is"
-        f" nearer on {nearer} of {len(biases[0])}."
+        f" pull they are off by {ours:.1f} %, the paper's method with the neo-Hookean law by"
+        f" {theirs:.1f} %; `posterior` is nearer on {nearer} of {len(biases[0])}."
     )
     return paragraph(text)
 

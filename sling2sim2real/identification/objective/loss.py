@@ -84,16 +84,23 @@ class EpisodeLoss:
     @classmethod
     def of(cls, params: Settings, method: str, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
         """Make it from params.yaml's `loss`, `force` and `methods.<method>`."""
-        return cls._weighed(params, dict(params.methods[method].weights), episode, sling)
+        weights = dict(params.methods[method].weights)
+        return cls._weighed(params, weights, episode, sling, params.loss.chamfer)
 
     @classmethod
     def plain(cls, params: Settings, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
-        """Geometry and force alone, for a part of an episode."""
-        return cls._weighed(params, {"geom": 1.0, "force": 1.0, "work": 0.0}, episode, sling)
+        """Geometry, of what the camera sees, and force alone, for a part of an episode."""
+        weights = {"geom": 1.0, "force": 1.0, "work": 0.0}
+        return cls._weighed(params, weights, episode, sling, "symmetric")
 
     @classmethod
     def _weighed(
-        cls, params: Settings, weights: dict[str, float], episode: Episode, sling: ClampedBand
+        cls,
+        params: Settings,
+        weights: dict[str, float],
+        episode: Episode,
+        sling: ClampedBand,
+        chamfer: str,
     ) -> EpisodeLoss:
         return cls(
             episode,
@@ -102,7 +109,7 @@ class EpisodeLoss:
             weights=weights,
             cutoff=cutoff_hz(params.force.cutoff, params.force.cutoff_unit),
             median_window=params.loss.median_window,
-            chamfer=params.loss.chamfer,
+            chamfer=chamfer,
         )
 
     def terms(self, rollouts: Rollouts) -> dict[str, np.ndarray]:

@@ -154,7 +154,7 @@ def gather(params: Params, root: str | Path = ".") -> Run:
     results, trials = {}, []
     for name, recording in run.recordings.items():
         pairs = {m: run.pairs[key] for m in params.methods if (key := f"{name}-{m}") in run.pairs}
-        if recording == run.first[recording.band]:
+        if name == run.first[recording.band].key:
             results[recording.band] = {m: _result(params, layout, pairs[m]) for m in pairs}
         else:
             pairs = {run.main: pairs[run.main]}

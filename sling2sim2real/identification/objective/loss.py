@@ -82,24 +82,19 @@ class EpisodeLoss:
         self._lock = threading.Lock()
 
     @classmethod
-    def of(cls, params: Settings, method: str, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
-        """Make it from params.yaml's `loss`, `force` and `methods.<method>`."""
-        return cls._weighed(params, dict(params.methods[method].weights), episode, sling)
-
-    @classmethod
-    def plain(cls, params: Settings, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
-        """Geometry and force alone, for a part of an episode."""
-        return cls._weighed(params, {"geom": 1.0, "force": 1.0, "work": 0.0}, episode, sling)
-
-    @classmethod
-    def _weighed(
-        cls, params: Settings, weights: dict[str, float], episode: Episode, sling: ClampedBand
+    def of(
+        cls, params: Settings, method: str | None, episode: Episode, sling: ClampedBand
     ) -> EpisodeLoss:
+        """Make it from params.yaml's `loss`, `force` and `methods.<method>`.
+
+        None: of geometry and force alone, for a part of an episode.
+        """
+        plain = {"geom": 1.0, "force": 1.0, "work": 0.0}
         return cls(
             episode,
             radius=sling.radius,
             rest_edges=sling.edge_lengths,
-            weights=weights,
+            weights=dict(params.methods[method].weights) if method else plain,
             cutoff=cutoff_hz(params.force.cutoff, params.force.cutoff_unit),
             median_window=params.loss.median_window,
             chamfer=params.loss.chamfer,

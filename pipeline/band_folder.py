@@ -36,6 +36,28 @@ from sling2sim2real.launching.trials.stretch import recorded_stretch
 from sling2sim2real.settings import Settings
 from sling2sim2real.simulator.model import LaunchHistory
 
+KEPT = (  # settings that who uses the folder needs: what the stage `card` depends on
+    "force",
+    "launch",
+    "parameters",
+    "plan.frame",
+    "policy.targets",
+    "setup",
+    "sling",
+    "trials",
+)
+
+
+def kept(settings: Settings, method: str) -> dict[str, dict]:
+    """Of these, and of the method, what differs from the library's defaults."""
+    other, found = differences(settings, Settings.default()), {}
+    for place in (*KEPT, f"methods.{method}"):
+        section, _, key = place.partition(".")
+        values = other.get(section, {})
+        if values := {name: values[name] for name in values if key in ("", name)}:
+            found[section] = values
+    return found
+
 
 def identified(pair: Pair, root: str | Path = ".") -> Identification:
     """What the method of a pair found of a band, by one of its recordings, whose name it bears.
@@ -90,8 +112,7 @@ def write(pair: Pair, root: str | Path = ".") -> dict:
         folder = BandFolder(temporary)
         stored, policy = Stored(layout.policy(pair)), Stored.of_band(temporary)
         sizes = {name: getattr(found.band, name) for name in SIZES}
-        other = differences(found.settings, Settings.default())
-        other.pop("bands", None)
+        other = kept(found.settings, pair.method)
         BandFile(sizes, found.band.preconditioned, (), other).save(folder.band_file)
         found.save(folder.theta)
         shutil.copyfile(stored.network, policy.network)

@@ -12,20 +12,17 @@ from pipeline.layout import Layout
 from sling2sim2real.base.layout import made
 from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.identification.searches.regions import regions_of, save_regions
-from sling2sim2real.settings.identification import parameter_names
 from stages.start import pair_of_stage, run
 
 
 def main() -> None:
     params, pair = pair_of_stage()
     method_params, layout = params.methods[pair.method], Layout()
-    names = tuple(
-        name for name in parameter_names(method_params.law) if name not in method_params.fixed
-    )
-    explored = Evaluations.load(pair.method, names, made(layout.history(pair)))
+    explored = Evaluations.load(pair.method, made(layout.history(pair)))
+    explored.names = tuple(name for name in explored.names if name not in method_params.fixed)
     explored.best_row()  # says why, where all failed
     regions = regions_of(method_params, params.optimizer, explored)
-    save_regions(layout.clusters(pair), names, regions)
+    save_regions(layout.clusters(pair), explored.names, regions)
     print(f"{pair.key}: {len(regions)} regions, best loss {regions[0].loss:.5g}")
 
 

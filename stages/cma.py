@@ -19,21 +19,22 @@ from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.identification.results.theta import law_entries, save_confidence
 from sling2sim2real.identification.searches.cma_es import refine
 from sling2sim2real.identification.searches.regions import load_regions
-from sling2sim2real.settings.identification import parameter_names
 from stages.start import pair_of_stage, run
 
 
 def main() -> None:
     params, pair = pair_of_stage()
-    method, law, layout = pair.method, params.methods[pair.method].law, Layout()
+    method, layout = pair.method, Layout()
+    law, mounting = params.methods[method].law, params.methods[method].mounting
     regions, _ = load_regions(made(layout.clusters(pair)))
-    explored = Evaluations.load(method, parameter_names(law), made(layout.history(pair)))
+    explored = Evaluations.load(method, made(layout.history(pair)))
     episode, rollouts = Episode.load(layout.episode(pair)), params.optimizer.cma_rollouts
     recorded = pair.band, method, episode, layout.clamps(pair)
     evaluate = logging_evaluator(f"cma-{pair.key}", params, *recorded, rollouts)
     refined = refine(params, method, regions, evaluate)
     explored.followed_by(refined).save(layout.evaluations(pair))
-    save_confidence(layout.confidence(pair), pair.band, law_entries(law, launch_history(episode)))
+    entries = law_entries(law, launch_history(episode))
+    save_confidence(layout.confidence(pair), pair.band, entries, mounting=mounting)
 
 
 if __name__ == "__main__":

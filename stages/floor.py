@@ -38,18 +38,8 @@ def main() -> None:
                 " setup.max_force, widen setup.draw_y and setup.draw_z, or move trials.targets",
                 file=sys.stderr,
             )
-    content = {
-        "band": band,
-        "kind": "virtual",
-        **floor,
-        "actuation_error_m": params.trials.actuation_error,
-        "release_jitter": params.rig.release_jitter,
-        "seed": params.trials.seed,
-    }
-    write_json(Layout().floor(band), content)
-    mean, landed = floor["mean_error_m"], floor["launches"] - floor["failed"]
-    summary = "no launch lands" if mean is None else f"{100 * mean:.2f} cm over {landed} launches"
-    print(f"{band}: floor {summary}")
+    write_json(Layout().floor(band), {"band": band, **floor})
+    print(f"{band}: floor {floor['mean_error_m']} m, {floor['failed']} launches failed")
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ runs on one thread of the CPU.
 
 from __future__ import annotations
 
-import numpy as np
+from functools import partial
 
 from pipeline.layout import Layout
 from sling2sim2real.base.machine import devices
@@ -27,10 +27,7 @@ def main() -> None:
     params, pair = pair_of_stage()
     band, layout = pair.band, Layout()
     clamps, theta = layout.clamps(pair), load_theta(layout.theta(pair), band)
-
-    def asked(draw: np.ndarray) -> dict | None:
-        return asked_of_the_hand(params, band, theta, draw, clamps)
-
+    iterations = params.policy.iterations
     how = make_policy(
         layout.policy(pair),
         simulator(params, band, theta, clamps, device=devices()),
@@ -38,10 +35,8 @@ def main() -> None:
         band,
         pair.method,
         theta,
-        asked=asked,
-        progress=Progress(
-            f"policy-{pair.key}", params.policy.iterations, "iterations", every=EVERY
-        ),
+        asked=partial(asked_of_the_hand, params, band, theta, clamps=clamps),
+        progress=Progress(f"policy-{pair.key}", iterations, "iterations", every=EVERY),
     )
     print(f"{pair.key}: {how}")
 

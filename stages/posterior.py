@@ -9,11 +9,8 @@ data/evaluations/<pair>.parquet; intervals, and samples of them, to data/confide
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from pipeline.layout import Layout
-from pipeline.params import Params
-from sling2sim2real.base.launches_file import FIT, read_launches
+from sling2sim2real.base.launches_file import read_launches
 from sling2sim2real.base.layout import made
 from sling2sim2real.base.machine import workers
 from sling2sim2real.episode.episode import Episode
@@ -23,21 +20,23 @@ from sling2sim2real.identification.posterior.confidence import (
     theta_entries,
 )
 from sling2sim2real.identification.posterior.identify import fit_posterior
-from sling2sim2real.identification.posterior.launches import Evidence, Observed
+from sling2sim2real.identification.posterior.launches import Evidence, observed
 from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.identification.results.theta import save_confidence, sling_of_method
-from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.simulator.model import LaunchSetup
 from stages.start import pair_of_stage, run
 
 
 def main() -> None:
     params, pair = pair_of_stage()
-    layout, method, law = Layout(), pair.method, params.methods[pair.method].law
-    explored = Evaluations.load(method, parameter_names(law), made(layout.history(pair)))
+    layout, method = Layout(), pair.method
+    law, mounting = params.methods[method].law, params.methods[method].mounting
+    explored = Evaluations.load(method, made(layout.history(pair)))
     sling = sling_of_method(params, pair.band, method, layout.clamps(pair))
     episodes = Episode.load_all(layout.episodes(pair))
-    evidence = evidence_of(layout.launches(pair.band), params)
+    rows = read_launches(made(layout.launches(pair.band)))
+    seen = observed(rows, params.trials.actuation_error)
+    evidence = Evidence(seen, LaunchSetup.of(params.setup, params.sling)) if seen else None
     density = fit_posterior(
         params,
         method,
@@ -56,22 +55,9 @@ def main() -> None:
         "confidence": confidence(density),
         "rollouts": len(explored.total) + density.rollouts,
     }
-    save_confidence(layout.confidence(pair), pair.band, entries, density.parameters)
-
-
-def evidence_of(path: Path, params: Params) -> Evidence | None:
-    """The launches of a file that are to fit, and what launches them here; None without any.
-
-    A draw without an error of its own has that of a commanded one, `trials.actuation_error`.
-    """
-    usual = params.trials.actuation_error
-    observed = [
-        Observed(row.draw, usual if row.error is None else row.error, row.landing)
-        for row in read_launches(made(path))
-        if row.use == FIT and row.landing is not None
-    ]
-    setup = LaunchSetup.of(params.setup, params.sling)
-    return Evidence(observed, setup) if observed else None
+    save_confidence(
+        layout.confidence(pair), pair.band, entries, density.parameters, mounting=mounting
+    )
 
 
 if __name__ == "__main__":

@@ -5,6 +5,8 @@ python -m stages.record band1-dips
 
 from __future__ import annotations
 
+from functools import partial
+
 from pipeline.layout import Layout
 from rig.recorder.record import record
 from sling2sim2real.base.errors import UserError
@@ -16,11 +18,8 @@ def main() -> None:
     if recording.key not in params.run.rig:
         raise UserError(f"{recording.key}: not under run.rig in params.yaml")
     path = Layout().recorded(recording)
-    record(params, recording.band, path, print_line, recording=recording.recording)
-
-
-def print_line(line: str) -> None:
-    print(line, flush=True)
+    say = partial(print, flush=True)
+    record(params, recording.band, path, say, recording=recording.recording)
 
 
 if __name__ == "__main__":

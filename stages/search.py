@@ -25,8 +25,9 @@ def main() -> None:
     recorded = pair.band, pair.method, episode, layout.clamps(pair)
     evaluate = logging_evaluator(f"search-{pair.key}", params, *recorded, rollouts)
     explore(params, pair.method, evaluate).save(layout.evaluations(pair))
-    entries = law_entries(params.methods[pair.method].law, launch_history(episode))
-    save_confidence(layout.confidence(pair), pair.band, entries)
+    method = params.methods[pair.method]
+    entries = law_entries(method.law, launch_history(episode))
+    save_confidence(layout.confidence(pair), pair.band, entries, mounting=method.mounting)
 
 
 if __name__ == "__main__":

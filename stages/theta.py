@@ -16,7 +16,6 @@ from sling2sim2real.base.layout import made
 from sling2sim2real.base.parameters import TABLE
 from sling2sim2real.identification.results.evaluations import TERMS, Evaluations, theta_content
 from sling2sim2real.identification.results.theta import load_confidence
-from sling2sim2real.settings.identification import parameter_names
 from stages.start import pair_of_stage, run
 
 DIGITS = 4  # of metrics: another kind of CPU differs beyond them
@@ -33,15 +32,9 @@ def metrics(content: dict) -> dict[str, float]:
 
 
 def main() -> None:
-    params, pair = pair_of_stage()
-    band, method, layout = pair.band, pair.method, Layout()
-    method_params = params.methods[method]
-    names = parameter_names(method_params.law)
-    evaluations = Evaluations.load(method, names, made(layout.evaluations(pair)))
-    entries = load_confidence(layout.confidence(pair))
-    if not method_params.mounting:  # the clamps were left as `setup` says
-        entries["mounted"] = False
-    content = theta_content(evaluations, band, entries)
+    (_, pair), layout = pair_of_stage(), Layout()
+    evaluations = Evaluations.load(pair.method, made(layout.evaluations(pair)))
+    content = theta_content(evaluations, pair.band, load_confidence(layout.confidence(pair)))
     write_json(layout.theta(pair), content)
     write_json(layout.metrics(pair), {pair.key: metrics(content)})
     print(f"{pair.key}: loss {content['loss']['total']:.5g}")

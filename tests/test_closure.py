@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.band_folder import KEPT
 from sling2sim2real.base import code as of_project
 from sling2sim2real.base.code import CODE, NESTED, ROOT, UNTRACKED, closure
 from sling2sim2real.settings.identification import OWN, SEARCHES
@@ -51,6 +52,10 @@ def test_stages_list_the_folders_that_they_run() -> None:
         code = {*folders(script_of(stage)), *filter(None, [BY_NAME.get(name)])}
         assert {*listed} == code, f"{name}: `python tools/closure.py` says what differs"
         assert len(listed) <= 14
+
+
+def test_a_bands_folder_keeps_settings_that_its_stage_depends_on() -> None:
+    assert {*KEPT} <= {*STAGES["card"]["params"]}
 
 
 def test_what_a_run_may_leave_empty_is_in_git() -> None:

@@ -206,10 +206,11 @@ def test_python_identifies_what_the_stage_does(project: Copy) -> None:
 from pathlib import Path
 import sling2sim2real as s2s
 run = s2s.Identification.load("reports/bands/band1")
+settings = s2s.Settings.load("params.yaml")
 episode = s2s.Episode.load(Path("data/episodes/band1/plain/1"))
-error = run.settings.trials.actuation_error
+error = settings.trials.actuation_error
 seen = s2s.Observed((-0.3, -0.17), error, 2.0)
-found = s2s.identify([episode], run.band, launches=[seen], settings=run.settings)
+found = s2s.identify([episode], run.band, launches=[seen], settings=settings)
 assert found.theta == run.theta, (found.theta, run.theta)
 assert (found.samples == run.samples).all() and found.intervals == run.intervals
 """

@@ -60,7 +60,7 @@ def test_the_papers_preset_has_no_method_of_ours_and_searches_the_whole_box(tmp_
     params = load(path)
     run = [params.methods[pair.method] for pair in params.run.pairs.values()]
     assert len(run) == 16 and not any(method.mounting for method in run)
-    assert {method.law for method in run} == {"neo_hookean"} and not any(
+    assert {method.law for method in run} == {"corotated"} and not any(
         method.bounds for method in run
     )
     assert not params.methods["paper"].fixed

@@ -3,8 +3,9 @@
     python tools/hero.py band2    # from a run's data; writes docs/hero.webp
 
 First the pull with dips of BAND beside its simulation; then its release, 50 times slower, paused
-at each picture of the camera; then virtual launches at one target by this project's method and by
-the paper's, which has BAND's recording without a dip, with the predicted 90 % intervals.
+at each picture of the camera; then virtual launches of BAND at one target by the paper's method, by
+`posterior` from the same pull, and by `posterior` from the pull with dips, with the predicted 90 %
+intervals where a method has them.
 """
 
 from __future__ import annotations
@@ -40,9 +41,10 @@ PULL_STEP, PULL_SHOWN = 0.24, 80  # s between frames of the pull, and ms for eac
 BEFORE, AFTER = -0.02, 0.05  # of the release [s]
 DRAWN, FLIGHT_SHOWN, HOLD = 900, 50, 2500  # ms before a flight, for each of its points, and after
 QUALITY = 40
-Y, LOW = (-0.5, 2.5), -0.56  # m that a row of launches shows, and its lower edge
+Y, LOW = (-0.5, 3.4), -0.56  # m that a row of launches shows, and its lower edge
 WIDE, TALL = 2 * animation.WIDE, animation.HEAD + animation.TALL  # pixels of a frame
-ROW = TALL // 2
+ROWS = 3
+ROW = TALL // ROWS
 GREY, PALE, OUR, THEIR = "#8a8a8a", "#d5d5d5", "#e0007a", "#0072b2"
 
 
@@ -71,6 +73,7 @@ class LaunchRow:
     def draw(self, draw: ImageDraw.ImageDraw, part: float) -> None:
         """The fork, and a launch up to a part of its way: 0 is drawn, at 1 all have landed."""
         first, floor, color = self.trials.iloc[0], self.floor, self.color
+        bold, interval = font(16, bold=True), np.isfinite(first.predicted_low)
 
         def line(*points: tuple[float, float], fill: str, width: int = 2) -> None:
             draw.line([self.place(y, z) for y, z in points], fill=fill, width=width)
@@ -79,15 +82,17 @@ class LaunchRow:
             u, v = self.place(*at)
             draw.ellipse((u - size, v - size, u + size, v + size), fill=INK)
 
-        draw.text((10, self.top + 6), self.title, fill=color, font=font(16, bold=True))
+        draw.text((WIDE - 10, self.top + 6), self.title, fill=color, font=bold, anchor="ra")
         line((Y[0], floor), (Y[1], floor), fill=PALE)
         line((0, floor), (0, 0), fill=GREY, width=4)
-        line((first.predicted_low, floor), (first.predicted_high, floor), fill=color, width=7)
         u, v = self.place(self.target, floor)
         draw.line((u, v - 26, u, v + 8), fill=INK, width=2)
         draw.text((u, v - 44), "target", fill=INK, font=font(13), anchor="ma")
-        u, v = self.place(first.predicted_high, floor)
-        draw.text((u + 8, v - 16), "90 % predicted", fill=color, font=font(13))
+        if interval:
+            low, high = (first.predicted_low, floor), (first.predicted_high, floor)
+            line(low, high, fill=color, width=7)
+            u, v = self.place(*high)
+            draw.text((u + 8, v - 16), "90 % predicted", fill=color, font=font(13))
         held = first.draw_y, first.draw_z
         way = list(zip(first.flight_y, first.flight_z, strict=True))
         way = [(0, 0), held] if part == 0 else way[: max(2, round(min(part, 1) * len(way)))]
@@ -99,10 +104,12 @@ class LaunchRow:
         for end in ends:
             ball(end, 3)
         y = np.array(ends)[:, 0]
-        inside = int(((y >= first.predicted_low) & (y <= first.predicted_high)).sum())
         off = 100 * np.abs(y - self.target).mean()
-        text = f"{len(ends)} virtual launches: {off:.0f} cm from the target, {inside} as predicted"
-        draw.text((10, self.top + 28), text, fill=INK, font=font(14))
+        text = f"{len(ends)} virtual launches: {off:.0f} cm from the target"
+        if interval:
+            inside = ((y >= first.predicted_low) & (y <= first.predicted_high)).sum()
+            text += f", {inside} as predicted"
+        draw.text((WIDE - 10, self.top + 28), text, fill=INK, font=font(14), anchor="ra")
 
 
 def recorded(pair: Pair) -> list[Frame]:
@@ -124,13 +131,14 @@ def recorded(pair: Pair) -> list[Frame]:
 
 
 def launched(band: str) -> list[Frame]:
-    """Launches by both methods: drawn, flying, landed."""
+    """Launches by the rows' methods and pulls: drawn, flying, landed."""
     params, layout = load(ROOT / "params.yaml"), Layout(ROOT)
     floor, target = -params.setup.fork_height, params.trials.targets[1]
     rows = []
     for title, color, key in (
-        ("this project, from one pull with dips", OUR, f"{band}-dips-{OURS}"),
         ("the paper's method, from the paper's pull", THEIR, f"{band}-{PAPER}"),
+        ("posterior, from the paper's pull", OUR, f"{band}-{OURS}"),
+        ("posterior, from a pull with dips", OUR, f"{band}-dips-{OURS}"),
     ):
         trials = pd.read_parquet(made(layout.trials(params.run.pairs[key])))
         trials = trials[trials.target == target]

@@ -3,7 +3,7 @@
     python tools/site.py    # build/site/index.html; needs the extra `docs`
 
 Pages link to files all over the project, so the source of the site is a copy of it. The reference
-is made from the docstrings of what `import sling2sim2real` has.
+is made: functions of their docstrings, commands of their help, settings of params.yaml.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ sys.path.insert(0, str(ROOT))
 import sling2sim2real  # noqa: E402
 from sling2sim2real.base import errors  # noqa: E402
 from sling2sim2real.base.errors import UserError  # noqa: E402
+from sling2sim2real.cli.cli import parser  # noqa: E402
 
 SOURCE = ROOT / "build" / "site-source"
 LEFT_OUT = "tests/", ".dvc/", "dvc.lock"
@@ -41,7 +42,21 @@ def lay_out(folder: Path) -> None:
     for file in (folder / "sling2sim2real").glob("*.py"):
         file.write_text(EXAMPLE.sub(_headed, file.read_text("utf-8")), encoding="utf-8")
     names = "\n\n".join(f"::: sling2sim2real.{name}" for name in sling2sim2real.__all__)
-    (folder / "reference.md").write_text(f"# Reference\n\n{names}\n", encoding="utf-8")
+    written = {
+        "functions": f"# Python functions\n\n{names}\n",
+        "commands": f"# Commands\n{commands()}",
+        "settings": f"# Settings\n\n```yaml\n{(ROOT / 'params.yaml').read_text('utf-8')}```\n",
+    }
+    for name, text in written.items():
+        (folder / "docs" / "reference" / f"{name}.md").write_text(text, encoding="utf-8")
+
+
+def commands() -> str:
+    """The help of each command of `sling`."""
+    subs = next(vars(action)["choices"] for action in parser()._actions if action.choices)
+    return "".join(
+        f"\n## sling {name}\n\n```\n{command.format_help()}```\n" for name, command in subs.items()
+    )
 
 
 def _headed(example: re.Match) -> str:

@@ -42,7 +42,7 @@ BLOCKS: dict[str, tuple[str, Callable[[], list[str]]]] = {  # by page: name of i
         "landings",
         lambda: landings.table({s: read(ROOT / landings.report_of(s)) for s in landings.SETS}),
     ),
-    "docs/paper.md": ("ablations", lambda: ablations.table(read(ROOT / headline.LARGE))),
+    "docs/paper.md": ("ablations", lambda: ablations.table(read(ROOT / ablations.LARGE))),
     "docs/recording.md": ("field", lambda: field.table(read(ROOT / field.REPORT))),
     "docs/times.md": ("times", lambda: times.table(read(ROOT / times.REPORT))),
 }

@@ -22,10 +22,12 @@ from sling2sim2real.drawing.canvas import P, Saving
 from sling2sim2real.drawing.page import page
 from sling2sim2real.drawing.styles import drawn
 from sling2sim2real.identification.results.ranges import searched
+from sling2sim2real.settings.identification import POSTERIOR
 
 HERE = Path(__file__).parent
 HTML = {"README": "index", "appendix": "appendix"}  # names of pages
 LINK = re.compile(rf"\]\(((?:bands/[^)/]+/card/)?)({'|'.join(HTML)})\.md\)")
+CONVERGED = 5760  # rollouts by which seeds of the paper's search agree (docs/paper.md)
 TARGETS = 101  # of the policy's path that is drawn, from the nearest to the farthest
 
 
@@ -95,6 +97,8 @@ class Report:
             paper=tables.PAPER,
             sources={source for table, _ in paper_tables.values() for source in table.source},
             area=TARGET_AREA,
+            unconverged=self._unconverged(),
+            converged=CONVERGED,
             trusted=any(result.confidence for result in run),
             edges=(known.edge != "").any(),
             overview=self._overview(),
@@ -132,6 +136,14 @@ class Report:
             trials=params.trials,
             rig=params.run.rig,
         )  # fmt: skip
+
+    def _unconverged(self) -> int | None:
+        """Rollouts of each search of the paper's loss, where they are too few; else None."""
+        params = self.run.params
+        optimizer = params.optimizer
+        budget = optimizer.population * (optimizer.generations + 1) + optimizer.cma_rollouts
+        searches = {params.methods[result.method].search for result in self.run} - {POSTERIOR}
+        return budget if searches and budget < CONVERGED else None
 
     def _csv(self, name: str, records: pd.DataFrame) -> None:
         with replacing(self.folder / "tables" / f"{name}.csv") as temporary:

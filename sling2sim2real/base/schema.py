@@ -31,7 +31,7 @@ from sling2sim2real.base.layout import NotMade
 class Section(BaseModel):
     """A mapping of params.yaml. Integers pass for floats; nothing else is converted."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, defer_build=True)
 
 
 class JsonRecord(Section):

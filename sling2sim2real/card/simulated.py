@@ -10,7 +10,7 @@ from scipy.interpolate import Akima1DInterpolator
 from sling2sim2real.api.identification import Identification
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.posterior.likelihood import opening_time
+from sling2sim2real.simulator.interaction import with_recorded_pads
 from sling2sim2real.simulator.replay import replay
 
 COARSE, FINE = 1 / 30, 1e-3  # s between states, around the release FINE
@@ -66,7 +66,7 @@ def simulate(found: Identification, episode: Episode) -> Simulated:
     camera = 0.0
     if "release_time" in derived:  # as the density has them (identification/posterior)
         friction = found.theta.dynamic_friction
-        sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
+        sling = with_recorded_pads(sling, episode, friction)
         episode = replace(episode, release_time=derived["release_time"]["value"])
         camera = -derived["camera_delay"]["value"]
     release = episode.release_time

@@ -26,12 +26,11 @@ from sling2sim2real.base.disk import expect_writable
 from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.base.files import replacing, replacing_folder, write_json
 from sling2sim2real.base.fingerprint import fingerprint
-from sling2sim2real.base.launches_file import FIT
 from sling2sim2real.base.layout import NotMade
 from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.cli.steps import Steps
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.posterior.launches import Observed
+from sling2sim2real.identification.posterior.launches import observed
 from sling2sim2real.identification.results.theta import Mounting
 from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.recording import files as bag
@@ -207,7 +206,7 @@ def _link(recording: Path, target: Path) -> None:
             link(parts[0], temporary)
     else:
         with replacing_folder(target) as temporary:
-            for part in [*parts, *bag.metadata_of(recording)]:
+            for part in parts:
                 link(part, temporary / part.name)
 
 
@@ -266,11 +265,7 @@ def _identified(folder: BandFolder, episodes: Sequence[Episode], steps: Steps) -
     start = _start(folder, episodes[0], steps)
     steps.begin(DENSITY)
     usual = settings.trials.actuation_error
-    launches = [
-        Observed(row.draw, usual if row.error is None else row.error, row.landing)
-        for row in folder.launches
-        if row.use == FIT and row.landing is not None
-    ]
+    launches = observed(folder.launches, usual)
     found = identify(
         episodes, folder.band, launches=launches, settings=settings, start=start, progress=progress
     )

@@ -75,22 +75,18 @@ class Calibration:
         camera: Of the whole sensor.
         model: Name of the distortion model.
         rectified: The camera matrix of rectified images, shape (3, 3).
-        binning: Pixels of the sensor for one of the image, (x, y).
-        region: x, y, width, height of the part that is read out; width 0: all of it.
     """
 
     camera: Camera
     model: str
     rectified: np.ndarray
-    binning: tuple[int, int]
-    region: tuple[int, int, int, int]
 
     @property
     def kind(self) -> tuple[Hashable, ...]:
         """Everything: a calibration does not change."""
         camera = self.camera
         numbers = (*camera.matrix.flat, *camera.distortion, *self.rectified.flat)
-        return camera.width, camera.height, numbers, self.model, self.binning, self.region
+        return camera.width, camera.height, numbers, self.model
 
 
 def camera_from(
@@ -132,21 +128,9 @@ def camera_from(
             f"{topic} has distortion model {calibration.model!r} with {count}"
             " coefficients, publish plumb_bob (5), rational_polynomial (8) or equidistant (4)"
         )
-    # Of the images' size: cut to the region of interest and binned, as the calibration says.
-    if size is None or size == (camera.width, camera.height):
-        return camera
-    x, y, width, height = calibration.region
-    width, height = width or camera.width, height or camera.height
-    across, down = calibration.binning
-    if size != (width // across, height // down):
+    if size not in (None, (camera.width, camera.height)):
         raise UserError(
             f"images of {image} are {size[0]} x {size[1]} pixels, {topic} is of"
             f" {camera.width} x {camera.height}: publish the camera info of the images' own size"
         )
-    matrix = camera.matrix.copy()
-    # A pixel of the image is the middle of its bin: u = (u' + 0.5) * bin - 0.5.
-    matrix[0, 2] = (matrix[0, 2] - x + 0.5) / across - 0.5
-    matrix[1, 2] = (matrix[1, 2] - y + 0.5) / down - 0.5
-    matrix[0, :2] /= across
-    matrix[1, 1] /= down
-    return replace(camera, width=size[0], height=size[1], matrix=matrix)
+    return camera

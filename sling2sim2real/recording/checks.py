@@ -15,12 +15,11 @@ from sling2sim2real.recording.calibration import MATTERS, Calibration
 from sling2sim2real.recording.calibration import SURE as SHIFT_SURE
 from sling2sim2real.recording.clouds import Clouds, PictureLine, by_phase
 from sling2sim2real.recording.delays import Delays
-from sling2sim2real.recording.events import CALM, Part, Pull
+from sling2sim2real.recording.events import CALM, RUBBER, SETTLE, Part, Pull
 from sling2sim2real.recording.force import QUIET, flat_top
 from sling2sim2real.recording.frames import Geometry
 from sling2sim2real.recording.hold import Hold, hold_of
 from sling2sim2real.recording.pace import HELD, MOST_CLOSE
-from sling2sim2real.recording.release import RUBBER, SETTLE
 from sling2sim2real.recording.release_pictures import EMPTY_AFTER, ReleasePictures
 from sling2sim2real.recording.scene import Scene
 from sling2sim2real.recording.signals import Signals
@@ -44,11 +43,10 @@ LATE = 0.02  # s: a filter that delays by more makes the whole force late
 ASTRAY = np.deg2rad(7.0)  # beyond SURE: too far to be used
 RUBBERS = (0.06e6, 12e6)  # Pa: Young's moduli of rubbers
 NO_RUBBER = (0.01e6, 50e6)  # Pa: those of none
-LIGHT, WEIGHS = 0.25, 0.7  # of the band's weight on the hand: too little, and what it is
+LIGHT, HEAVY = 0.25, 1.4  # of the band's weight on the hand: too little, too much
 UNITS = {  # newtons in one
     "millinewtons": 1e-3,
-    "centinewtons": 1e-2,
-    "grams-force": 9.81e-3,
+    "centinewtons or grams-force": 9.81e-3,
     "pounds-force": 4.45,
     "kilograms-force": 9.81,
     "kilonewtons": 1e3,
@@ -68,7 +66,6 @@ class Check:
 
     Attributes:
         name: By which programs know it.
-        concern: What it is about.
         compares: What is compared with what.
         uncertainty: Of the comparison, and where it comes from.
         warns: From when on a finding costs accuracy; "" where it always refuses.
@@ -77,7 +74,6 @@ class Check:
     """
 
     name: str
-    concern: str
     compares: str
     uncertainty: str
     warns: str
@@ -111,124 +107,106 @@ class Finding:
 
 # fmt: off
 TABLE = (
-    Check("losses", "container",
+    Check("losses",
         "what the file holds with what can be read",
         "none: a message can be read or not",
         "anything was lost or mended",
         "no pull is left that can be used",
         "see whether it touches the pull; copy the file again, or record again"),
-    Check("gripper", "roles",
+    Check("gripper",
         "the recording's topics with those that tell of the grasp",
         "without a gripper the grasp is known to some 0.1 s",
         "no topic tells of the fingers",
         "neither the fingers nor a lift tell when the band is grasped",
         "record its joint states"),
-    Check("gap", "rates",
+    Check("gap",
         "the longest time between two messages, and their number, with a constant rate",
         "none: stamps are exact",
         f"{1e3 * GAPS['wrench']:g} ms of force, {1e3 * GAPS['pose']:g} ms of the pose,"
         f" {1e3 * GAPS['depth']:g} ms of pictures, or {100 * MISSING:g} % are missing",
         "0.3 s of force or pose, a gap at the release, or nearly all are missing",
         "record with reliable QoS to a local disk"),
-    Check("bursts", "rates",
-        "how the stamps of force, pose and gripper follow on one another with an even rate",
+    Check("stamps",
+        "how stamps and values of force, pose and gripper follow on one another with an even rate",
         "the even stamps' scatter, which is in the release's",
-        f"{100 * MOST_CLOSE:g} % of them come at once, and are spread evenly",
+        f"{100 * MOST_CLOSE:g} % come at once, and are spread evenly; or each value is sent"
+        f" {HELD:g} times or more, of which the first counts",
         "",
-        "stamp samples when they are measured (of an FTDI adapter: set its latency timer to 1 ms)"),
-    Check("held", "rates",
-        "how often the values of force and pose change with how often they are sent",
-        "none: they are counted",
-        f"each is sent {HELD:g} times or more: only its first message counts",
-        "",
-        "record the topic of what measures it, or send each value once"),
-    Check("rate", "rates",
+        "stamp a sample when it is measured, and send it once (FTDI: latency timer of 1 ms)"),
+    Check("rate",
         "the rates of force and pictures with the length of the release and of the recoil",
         "the usual time between values",
         f"force below {FORCE_RATE:g} Hz, pictures below {PICTURE_RATE:g} Hz",
         "",
         "record the force at 1 kHz, 30 pictures a second or more"),
-    Check("clock", "times",
+    Check("clock",
         "a topic's stamps with the force's, by the times of receipt, all through the recording",
-        "transport and driver: some 10 ms, of pictures up to 0.1 s; the scatter of each second's"
-        " least delay. Messages that pile up all along look like a slow clock",
+        "some 10 ms, of pictures up to 0.1 s; the scatter of each second's least delay",
         f"{1e3 * AHEAD:g} ms ahead, or {1e3 * BEHIND:g} ms behind ({1e3 * SLOW['depth']:g} ms of"
         f" pictures and gripper); {1e3 * DRIFTED:g} ms and {SURE:g} standard errors of drift",
         f"0.5 s off, or {1e3 * UNKNOWN_CLOCK:g} ms of drift",
         ONE_CLOCK),
-    Check("delay", "times",
+    Check("delay",
         "the stamps of pose and camera with the force's, by what the recording shows",
-        "standard error of the estimate, some 0.1 ms",
-        f"{SURE:g} standard errors and {1e3 * DELAY:g} ms",
-        "",
-        "mend them at their driver, or set episode.delays in params.yaml"),
-    Check("clock_unknown", "times",
-        "the stamps of pose and camera with the force's, where nothing shows their delay, or two"
-        " estimates disagree",
-        "what pictures of the release and the fit leave open; the estimates' standard errors",
-        f"the pose's clock is not known to {1e3 * OPEN:g} ms, or estimates are {SURE:g} standard"
-        " errors apart",
+        "the estimates' standard errors; what nothing shows the fit leaves open",
+        f"{1e3 * DELAY:g} ms and {SURE:g} standard errors, which are taken out; the pose's is not"
+        f" known to {1e3 * OPEN:g} ms; or two estimates disagree",
         "",
         "record the force from the robot's own clock, or set episode.delays in params.yaml"),
-    Check("release_pictures", "times",
+    Check("release_pictures",
         "the last picture of the drawn band and the next one with the fall of the force, and each"
         " picture around it with the one before, pixel by pixel",
         f"a picture's time, and {1e3 * EMPTY_AFTER:g} ms in which the outer band leaves its place",
         "drawn after the force fell, or let go before it",
         "drawn for 0.4 s after the force fell, or one is sent again while the band must move",
         "stamp pictures when they are exposed, by the force's clock, or set episode.delays.camera"),
-    Check("range", "force",
+    Check("range",
         "the force's noise at its peak with the free hand's",
         "thousands of samples tell the scatter",
         "",
         f"below {100 * QUIET:g} % of it at an extreme value",
         "pull less far, or use a sensor of a larger range"),
-    Check("filter", "force",
+    Check("filter",
         "how long the force falls at the release, and its noise, with an unfiltered sensor's",
         "the time between samples",
         f"{1e3 * RUBBER:g} ms, or three samples where neighbouring ones have the same noise",
         f"{1e3 * LATE:g} ms",
         "record the sensor's own, unfiltered force"),
-    Check("zero", "force",
+    Check("zero",
         "the free hand's force, before the grasp and after the release, with a steady drift",
         "the means' and slopes' standard errors, by blocks of 50 ms",
         f"it drifts by {100 * DRIFT:g} % of the held force during the pull, moves by"
         f" {100 * ZERO_OFF:g} % but not steadily, or is not known to {100 * ZERO_UNSURE:g} %",
-        f"{100 * ZERO_FAR:g} %",
-        "let the sensor warm up, load it once before; keep the hand free and at rest at both ends"),
-    Check("zeroed", "force",
-        "sudden changes of the force that last with the free hand's before and after",
-        "the force's noise",
-        "the sensor was zeroed while recording; the steps are taken out",
-        "",
-        "zero the sensor before recording"),
-    Check("max_force", "force",
+        f"{100 * ZERO_FAR:g} %, as where the sensor is zeroed while recording",
+        "let the sensor warm up, zero it before recording; keep the hand free and at rest at both"
+        " ends"),
+    Check("max_force",
         "the peak force with setup.max_force",
         "the sensor's own",
         "above it",
         "",
         "pull less far, or set in params.yaml what the arm may hold"),
-    Check("release", "force",
+    Check("release",
         "how surely the force's fall tells the time of the release, and sudden drops before it",
         "the fall's standard error; the force's noise",
-        f"{1e3 * RELEASE:g} ms, or a drop before the release: the band slipped in the pads",
+        f"{1e3 * RELEASE:g} ms, or a drop before the release",
         "force is missing around the release, or never drops, or the gripper stays closed",
         "record the force at 1 kHz, unfiltered: 1 ms is 3 to 4 % of a landing"),
-    Check("direction", "hold",
+    Check("direction",
         "the held force with the plane of the band's two strands and their resultant, less half the"
         " band's weight",
         "about 1 degree: 5 mm of the hand's place, half a degree of the sensor's frame, the zero's",
         f"{SURE:g} standard errors",
         f"{np.degrees(ASTRAY):g} degrees more",
         "check the turn from the hand to the wrench's frame (/tf_static), then base_to_fork"),
-    Check("units", "hold",
+    Check("units",
         "the held force with a rubber's modulus, and the slack band's weight with its mass",
         "a factor of 2 of the modulus, by the law; the zero's of the weight",
         f"Young's modulus below {RUBBERS[0] / 1e6:g} or above {RUBBERS[1] / 1e6:g} MPa, or less"
         f" than {LIGHT:g} of the weight",
         f"below {NO_RUBBER[0] / 1e6:g} or above {NO_RUBBER[1] / 1e6:g} MPa",
         "let the driver publish newtons, or check the band's diameter, rest length and mass"),
-    Check("pause", "motion",
+    Check("pause",
         "the hand's rest before the release with the time in which rubber settles, and the"
         f" pictures' beginning with the pull before: a band swings for {CALM:g} s",
         "of the release: below a millisecond",
@@ -236,26 +214,26 @@ TABLE = (
         f" or less than {CALM:g} s after the pull before",
         "",
         "pause for 1 to 2 s, until the force has settled"),
-    Check("coverage", "pictures",
+    Check("coverage",
         "the band's points with where the band must be, and the pictures' times with the phases",
         "a band's thickness; the mean of many pictures",
         ", ".join(f"{100 * least:g} % while it {SEEN_AS[k]}" for k, least in COVERAGE.items())
         + f"; a phase is in no picture, or {100 * EMPTY:g} % of the pictures show no band",
         "no picture shows a band, or the drawn band",
         LOOK),
-    Check("off_plane", "pictures",
+    Check("off_plane",
         "points of the hanging band with the plane that it hangs in",
         "16 mm at most on sound recordings; warned from 20 mm",
         f"{100 * FOREIGN:g} % of a picture's points are off it",
         "",
         LOOK),
-    Check("damaged", "pictures",
+    Check("damaged",
         "pictures with those that can be decoded, and depth with colour within half a period",
         "none: they are counted",
         f"{100 * EMPTY:g} % cannot be, or have no partner",
         "none can be, or none has one",
         "see whether the camera's driver sends empty ones; record both at one rate, reliably"),
-    Check("frames", "frames",
+    Check("frames",
         "the force's frame with those of /tf_static; setup.base_to_fork and setup.camera_to_fork"
         " with /tf_static, around the loop; poses that are published twice",
         "the touched tips' and the calibration's",
@@ -264,20 +242,15 @@ TABLE = (
         "base, camera and fork are not joined",
         "publish each frame once; touch the tips or calibrate the camera again"
         " (docs/recording.md, Calibration)"),
-    Check("extrinsics", "camera",
-        "where the drawn band says that the fork tips are with where they are, by component",
+    Check("extrinsics",
+        "where the drawn band says that the fork tips and the hand are with where they are",
         "standard errors of the fit to all pictures of the drawn band",
-        f"components of more than {SHIFT_SURE:g} standard errors add up to {1e3 * MATTERS:g} mm; or"
-        " too few pictures to tell",
+        f"components of the tips' of more than {SHIFT_SURE:g} standard errors add up to"
+        f" {1e3 * MATTERS:g} mm; the hand's are {1e3 * HAND_OFF:g} mm and {SURE:g} standard errors;"
+        " or too few pictures to tell",
         "",
         "calibrate the camera again: its pose, and its depth's scale"),
-    Check("hand", "camera",
-        "the end of the drawn band with the tool centre point",
-        "standard error of the fit to all pictures of the drawn band",
-        f"{1e3 * HAND_OFF:g} mm and {SURE:g} standard errors",
-        "",
-        "check base_to_fork, the tool centre point, and where the pads hold the band"),
-    Check("pull", "pull",
+    Check("pull",
         "what was recorded with a pull: a lead-in, a grasp, a draw, a release, pictures of a band",
         "each step's own",
         "",
@@ -288,9 +261,9 @@ TABLE = (
 CHECKS = {check.name: check for check in TABLE}
 
 
-def found(name: str, what: str, cure: str | None = None, refused: bool = False) -> Finding:
+def found(name: str, what: str, cure: str = "", refused: bool = False) -> Finding:
     """What a check of the table found; the cure is its remedy where no other one is given."""
-    return Finding(name, what, CHECKS[name].remedy if cure is None else cure, refused)
+    return Finding(name, what, cure or CHECKS[name].remedy, refused)
 
 
 def of_topics(part: Part) -> Iterator[Finding]:
@@ -400,7 +373,8 @@ def of_calibration(seen: Calibration | None, geometry: Geometry) -> Iterator[Fin
     off, error = seen.hand_off
     if off > max(HAND_OFF, SURE * error):
         what = f"the band ends {1e3 * off:.1f} ± {1e3 * error:.1f} mm from the tool centre point"
-        yield found("hand", what)
+        cure = "check base_to_fork, the tool centre point, and where the pads hold the band"
+        yield found("extrinsics", what, cure)
 
 
 def camera_to_fork(seen: Calibration, geometry: Geometry) -> list[float]:
@@ -420,10 +394,10 @@ def _of_rates(stream: Stream, roles: list[str]) -> Iterator[Finding]:
     if stream.bursts:
         many, every = stream.bursts.count, stream.bursts.interval * 1e-6
         what = f"{stream.topic} is stamped in bursts of {many} every {every:.3g} ms"
-        yield found("bursts", f"{what}, spread evenly to ± {stream.bursts.error * 1e-6:.2g} ms")
+        yield found("stamps", f"{what}, spread evenly to ± {stream.bursts.error * 1e-6:.2g} ms")
     if stream.hold:
         what = f"{stream.topic} repeats each value for {1e3 * stream.hold:.3g} ms"
-        yield found("held", f"{what}: it has {rate:.0f} new values a second")
+        yield found("stamps", f"{what}: it has {rate:.0f} new values a second")
     if "wrench" in roles and rate < FORCE_RATE:
         what = f"the force comes at {rate:.0f} Hz, so the release is known only that coarsely"
         yield found("rate", what, "record it at 1 kHz")
@@ -488,13 +462,12 @@ def _of_delays(delays: Delays) -> Iterator[Finding]:
         yield found("delay", what, cure)
     left = delays.pose.left or 0.0
     if left > OPEN:
-        yield found(
-            "clock_unknown",
-            f"the pose's clock against the force's is not known better than"
-            f" ± {1e3 * left:.1f} ms, and each ms is 0.4 % of the modulus",
+        what = (
+            f"the pose's clock against the force's is not known better than ± {1e3 * left:.1f} ms"
         )
+        yield found("delay", f"{what}, and each ms is 0.4 % of the modulus")
     if delays.conflict:
-        yield found("clock_unknown", delays.conflict, ONE_CLOCK)
+        yield found("delay", delays.conflict, ONE_CLOCK)
     if delays.release is not None:
         yield from of_release(delays.release)
 
@@ -532,7 +505,7 @@ def _of_force(pull: Pull, signals: Signals, start: float, most: float) -> Iterat
         times = f"{top.begin:.2f} - {top.end:.2f} s"
         axis = "xyz"[top.axis]
         what = f"the force stops at {top.value:.1f} N along {axis} of the sensor ({times}),"
-        what, cure = f"{what} without noise: its range ends there", None
+        what, cure = f"{what} without noise: its range ends there", ""
         if top.frozen:
             what = f"the force does not change at all while it is large ({times}): the sensor froze"
             cure = "see why its driver stopped, and record again"
@@ -555,8 +528,6 @@ def _of_force(pull: Pull, signals: Signals, start: float, most: float) -> Iterat
         what = f"the free hand's force is known to {unsure:.2f} N only, which is"
         what += f" {100 * unsure / hold:.0f} % of the hold"
         yield found("zero", what, refused=unsure > ZERO_FAR * hold)
-    for time in facts.zeroed:
-        yield found("zeroed", f"the sensor was zeroed at {start + time:.2f} s, which is taken out")
     if facts.peak_force > most:
         what = f"the peak force of {facts.peak_force:.1f} N is above setup.max_force {most:g} N"
         yield found("max_force", what)
@@ -565,25 +536,27 @@ def _of_force(pull: Pull, signals: Signals, start: float, most: float) -> Iterat
         yield found("release", what)
     for time in facts.slips:
         what = f"the force drops suddenly at {start + time:.2f} s, before the release"
-        cure = "the band slipped in the pads: grip firmly and record again"
+        cure = "the band slipped in the pads, or the sensor was zeroed: record again"
         yield found("release", what, cure)
 
 
 def _of_hold(hold: Hold, weighed: bool) -> Iterator[Finding]:
     """Whether the held force is one that a drawn band makes."""
-    soft, hard = hold.modulus < RUBBERS[0], hold.modulus > RUBBERS[1]
+    modulus = hold.modulus
     # One that feels no weight at all tells of a sensor that estimates, not of units.
-    weighs = hold.weight is not None and hold.weight > SURE * hold.weight_error
-    light = weighs and (hold.weight or 0) + SURE * hold.weight_error < LIGHT
-    if soft or hard or light:
-        modulus = hold.modulus
+    weight = hold.weight if hold.weight and hold.weight > SURE * hold.weight_error else None
+    light = weight is not None and weight + SURE * hold.weight_error < LIGHT
+    if light or not RUBBERS[0] < modulus < RUBBERS[1]:
         shown = f"{modulus / 1e6:.3g} MPa" if modulus >= 1e5 else f"{modulus / 1e3:.3g} kPa"
         what = f"a band that holds {hold.size:.3g} N here would be of {shown}"
-        if weighs:
-            what += f" and weigh {hold.weight:.2g} times its mass on the hand"
-        unit = _unit(modulus, hold.weight if weighs else None)
-        if unit:
-            what += f": the force seems to be in {unit}"
+        what += f" and weigh {weight:.2g} times its mass on the hand" if weight else ""
+        fitting = [
+            unit
+            for unit, newtons in UNITS.items()
+            if RUBBERS[0] < modulus * newtons < RUBBERS[1]
+            and (weight is None or LIGHT < weight * newtons < HEAVY)
+        ]
+        what += f": the force seems to be in {' or '.join(fitting)}" if fitting else ""
         yield found("units", what, refused=not NO_RUBBER[0] < modulus < NO_RUBBER[1])
     if not weighed:  # its weight turns the force by degrees
         return
@@ -595,21 +568,6 @@ def _of_hold(hold: Hold, weighed: bool) -> Iterator[Finding]:
             what = f"the band {ways[k][int(force < 0)]} the hand by {abs(force):.1f} N,"
             what += f" {np.degrees(angle):.1f} ± {np.degrees(error):.1f} degrees {directions[k]}"
             yield found("direction", what, refused=angle > SURE * error + ASTRAY)
-
-
-def _unit(modulus: float, weight: float | None) -> str:
-    """Name the unit that makes a rubber of the band and its weight right; several where alike."""
-    fitting = [
-        name
-        for name, newtons in UNITS.items()
-        if RUBBERS[0] < modulus * newtons < RUBBERS[1]
-        and (weight is None or LIGHT < weight * newtons < 1 / WEIGHS)
-    ]
-    if weight is None:
-        return " or ".join(fitting)
-    fitting.sort(key=lambda name: abs(np.log(weight * UNITS[name] / WEIGHS)))
-    # What differs by a few percent neither weight nor modulus shows.
-    return " or ".join(name for name in fitting if 0.9 < UNITS[name] / UNITS[fitting[0]] < 1.1)
 
 
 def pause(signals: Signals) -> tuple[float, float]:

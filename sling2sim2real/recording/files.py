@@ -1,8 +1,8 @@
 """Recordings on disk: their messages by topic, whole or damaged, and what was lost of them.
 
 Read are MCAP files, ROS 2 bags in SQLite and ROS 1 bags, and the folder of a ROS 2 bag, whose parts
-are one recording: `ros2 bag record -o my` makes my/ with metadata.yaml and my_0.mcap; where it
-splits the bag, with my_1.mcap and so on. /tf_static is in the first part alone.
+are one recording: `ros2 bag record -o my` makes my/ with my_0.mcap; where it splits the bag, with
+my_1.mcap and so on. /tf_static is in the first part alone.
 
 A file is read once, message by message: each is decoded as it comes, pictures' bytes go to a
 temporary file, and topics of types that nobody reads are counted. What is wrong with a file is a
@@ -21,7 +21,6 @@ from __future__ import annotations
 import hashlib
 import re
 import struct
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -35,15 +34,12 @@ from mcap.exceptions import EndOfFile, McapError
 from mcap.reader import make_reader
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from rosbags.interfaces import MessageDefinitionFormat
-from rosbags.rosbag1 import Reader as Ros1Reader
-from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
-from ruamel.yaml import YAML, YAMLError
 
 from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.recording.messages import NO_SCHEMA, Spool, Topic
 from sling2sim2real.recording.words import counted, few
 
-METADATA, SUFFIXES = "metadata.yaml", (".mcap", ".db3", ".bag")
+SUFFIXES = (".mcap", ".db3", ".bag")
 GAP = 1.0  # s: a recorder that splits its bag pauses for less, people who record anew for more
 NAMED = 5  # files, places or topics named in one line
 LIMIT = 2**29  # bytes of one record
@@ -100,7 +96,7 @@ def read_container(path: Path) -> Container:
     """Read every intact message, of all parts of a bag. Raises UserError: nothing is to be read."""
     path, topics = Path(path), _Topics()
     parts = parts_of(path)
-    losses, notes = _missing(path), []
+    losses, notes = [], []
     if len(parts) > 1 and not path.is_dir():
         notes.append(f"all {len(parts)} parts of the bag were read, from {parts[0].name} on")
     for part in parts:
@@ -147,7 +143,7 @@ class _Mcap:
     Attributes:
         checked: Whether anything has a checksum.
         dropped: First and last log times of damaged chunks [ns].
-        orphans: Messages of each channel that no record before them explains.
+        orphans: How many messages no record before them explains.
         said: Messages that the file's end speaks of; None where it does not.
         stopped: What ended the reading, in words.
     """
@@ -157,9 +153,8 @@ class _Mcap:
         self.schemas: dict[int, kinds.Schema] = {0: NO_SCHEMA}
         self.channels: dict[int, kinds.Channel] = {}
         self.dropped: list[tuple[int, int]] = []
-        self.orphans: Counter[int] = Counter()
         self.said: int | None = None
-        self.read, self.first, self.last = 0, 0, 0
+        self.read, self.orphans, self.first, self.last = 0, 0, 0, 0
         self.checked = ended = False
         self.stopped = ""
         with suppress(*DAMAGE, OSError):  # the end repeats what a damaged chunk may have said
@@ -195,12 +190,14 @@ class _Mcap:
 
     def _take(self, record: kinds.McapRecord) -> None:
         if isinstance(record, kinds.Message):
-            topic = self.bound.get(record.channel_id) or self._bind(record.channel_id)
-            if topic is not None:
-                topic.add(record.log_time, record.data)
-                self.first = self.first or record.log_time
-                self.last = max(self.last, record.log_time)
             self.read += 1
+            topic = self.bound.get(record.channel_id) or self._bind(record.channel_id)
+            if topic is None:
+                self.orphans += 1
+                return
+            topic.add(record.log_time, record.data)
+            self.first = self.first or record.log_time
+            self.last = max(self.last, record.log_time)
         elif isinstance(record, kinds.Chunk):
             self.checked |= record.uncompressed_crc != 0
         elif isinstance(record, kinds.Schema):
@@ -217,7 +214,6 @@ class _Mcap:
         channel = self.channels.get(number)
         schema = self.schemas.get(channel.schema_id) if channel else None
         if channel is None or schema is None:
-            self.orphans[number] += 1
             return None
         self.bound[number] = self.topics.of(channel.topic, schema, channel.message_encoding)
         return self.bound[number]
@@ -232,12 +228,8 @@ class _Mcap:
             losses.append(
                 f"messages read of those that the file counts: {self.read} of {self.said}"
             )
-        for number, count in self.orphans.items():
-            name = printable(self.channels[number].topic) if number in self.channels else ""
-            what = f"{counted(count)} of {name or f'channel {number}'} dropped"
-            losses.append(
-                f"{what}: no record before says what {'type' * bool(name) or 'topic'} it is"
-            )
+        if self.orphans:
+            losses.append(f"{counted(self.orphans)} dropped: no record before says what it is")
         return losses
 
     def _cut(self, file: BinaryIO, stopped: int) -> str:
@@ -262,6 +254,9 @@ def _read_bag(part: Path, ros1: bool, topics: _Topics) -> None:
 
     Raises UserError where it is damaged.
     """
+    from rosbags.rosbag1 import Reader as Ros1Reader  # others do not need what these import
+    from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
+
     bag = Ros1Reader(part) if ros1 else Sqlite3Reader(part)
     try:
         bag.open()
@@ -284,8 +279,7 @@ def _read_bag(part: Path, ros1: bool, topics: _Topics) -> None:
 def parts_of(path: Path) -> list[Path]:
     """The files that are one recording, in order.
 
-    Of a folder those that its metadata.yaml lists and that are there; without it all, by number.
-    A file that is one of a split bag's parts stands for all of them.
+    Of a folder those in it, by number. A file that is one of a split bag's parts stands for all.
 
     Raises:
         UserError: There is no recording, or a folder holds several.
@@ -293,7 +287,13 @@ def parts_of(path: Path) -> list[Path]:
     path = Path(path)
     try:
         if path.is_dir():
-            return _in_folder(path)
+            files = _files(path)
+            if len(files) == 1 or _is_split(files):
+                return files
+            some = ", ".join(file.name for file in files[:NAMED])
+            several = f"holds several recordings, or not all parts of one, name one file: {some}"
+            nothing = "is a folder without a recording (ros2 bag record -s mcap writes one)"
+            raise UserError(f"{path}: {several if some else nothing}")
         if not path.is_file():
             raise UserError(f"{path}: {'is not a file' if path.exists() else 'no such file'}")
         if not path.stat().st_size:
@@ -301,36 +301,10 @@ def parts_of(path: Path) -> list[Path]:
         stem, number = _numbered(path)
         if number < 0:
             return [path]
-        if path in _listed(path.parent):
-            return _in_folder(path.parent)
         alike = [file for file in _files(path.parent) if _numbered(file)[0] == stem]
         return alike if _is_split(alike) else [path]
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror})") from error
-
-
-def _in_folder(folder: Path) -> list[Path]:
-    files, listed = _files(folder), _listed(folder)
-    if listed:
-        parts = [file for file in listed if file in files]
-        if not parts:
-            names = ", ".join(file.name for file in listed[:NAMED])
-            raise UserError(f"{folder}: {METADATA} lists {names}, of which none is there")
-        return parts
-    if not files:
-        raise UserError(
-            f"{folder}: is a folder without a recording (ros2 bag record -s mcap writes one)"
-        )
-    if len(files) == 1 or _is_split(files):
-        return files
-    names = ", ".join(sorted(file.name for file in files)[:NAMED])
-    raise UserError(f"{folder}: holds several recordings, name one of them: {names}")
-
-
-def metadata_of(path: Path) -> list[Path]:
-    """The file that lists a bag's parts, where there is one."""
-    parts = parts_of(path)
-    return [parts[0].with_name(METADATA)] if parts[0] in _listed(parts[0].parent) else []
 
 
 def once(paths: Iterable[Path]) -> list[Path]:
@@ -364,13 +338,6 @@ def sha256(path: Path) -> str:
     return hashlib.sha256("\n".join(digests).encode()).hexdigest()
 
 
-def _missing(path: Path) -> list[str]:
-    """The parts of a bag that are listed and not there, in words."""
-    folder, parts = parts_of(path)[0].parent, parts_of(path)
-    gone = [file for file in _listed(folder) if file not in parts] if metadata_of(path) else []
-    return [f"{file.name}, which {METADATA} lists, is missing" for file in gone]
-
-
 def _files(folder: Path) -> list[Path]:
     """Recordings by their names, in the order of their numbers."""
     files = [file for file in folder.iterdir() if file.suffix in SUFFIXES and file.is_file()]
@@ -383,27 +350,10 @@ def _numbered(file: Path) -> tuple[str, int]:
     return (match[1], int(match[2])) if match else (file.stem, -1)
 
 
-def _listed(folder: Path) -> list[Path]:
-    """The files that a bag's metadata lists, there or not; none without it. Raises UserError."""
-    path = folder / METADATA
-    if not path.is_file():
-        return []
-    try:
-        content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-        names = content["rosbag2_bagfile_information"]["relative_file_paths"]
-        listed = {folder / printable(Path(str(name)).name) for name in names}
-    except (YAMLError, ValueError, RecursionError, KeyError, TypeError) as error:
-        raise UserError(
-            f"{path}: is no metadata of a ROS 2 bag; without it the files are taken by number:"
-            " remove it, or `ros2 bag reindex` the bag"
-        ) from error
-    return sorted(listed, key=_numbered)
-
-
 def _is_split(files: list[Path]) -> bool:
     """Whether these are the parts of one bag, each of which begins where the one before ends."""
     numbered = [_numbered(file) for file in files]
-    if len(files) < 2 or numbered[0][1] != 0 or len({stem for stem, _ in numbered}) > 1:
+    if len(files) < 2 or numbered != [(numbered[0][0], k) for k in range(len(files))]:
         return False
     spans = [_span(file, file.stat().st_mtime_ns) for file in files]
     return all(

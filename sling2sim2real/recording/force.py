@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.events import Pull
+from sling2sim2real.recording.events import LEAST_LEAD_IN, MARGIN, SETTLE, Pull, Release
 from sling2sim2real.recording.frames import Geometry
-from sling2sim2real.recording.grasp import LEAST_LEAD_IN, MARGIN
 from sling2sim2real.recording.motion import Motion, interpolated
-from sling2sim2real.recording.release import SETTLE, Release
-from sling2sim2real.recording.zero import Drift, drift_of
 from sling2sim2real.settings.lab import Tool
 
 GRAVITY = np.array([0.0, 0.0, -9.81])  # m/s^2, frame O
@@ -54,7 +51,7 @@ def band_force(
     """Take the tool, the bias and the drift from a raw force, and find its sign.
 
     Taken away are the tool's load, then, in the sensor's frame, the lead-in's mean and the drift
-    until the free hand at the end where that is steady (`zero`).
+    until the free hand at the end where that is steady (`drift_of`).
 
     Args:
         t: Times [s], shape (S,).
@@ -153,8 +150,81 @@ def load_per_mass(
     return sensor_turns(motion, geometry, times).inv().apply(specific)
 
 
+BLOCK = 0.05  # s: means over so long are independent of one another
+LEAST_BLOCKS = 6
+SURE = 4.0  # standard errors
+MATTERS = 0.01  # of the drop, from which a drift's course is looked at
+OTHER = 0.5  # of a steady drift, by which its slope in a window may differ
+
+
+@dataclass(frozen=True)
+class Drift:
+    """The sensor's zero before and after the load, in its own frame.
+
+    Attributes:
+        rate: Of a steady drift, that is to be taken out (3,) [N/s]; 0 where it is not steady.
+        change: From the lead-in to the free hand at the end (3,) [N]; None where that says nothing.
+        error: Standard deviation of its length [N].
+        steady: Whether the course within both windows agrees with a steady drift.
+    """
+
+    rate: np.ndarray
+    change: np.ndarray | None = None
+    error: float = 0.0
+    steady: bool = True
+
+    def seen_from(self, turn: Rotation) -> Drift:
+        """The drift in another frame, into which `turn` turns the sensor's."""
+        change = None if self.change is None else turn.apply(self.change)
+        return replace(self, rate=turn.apply(self.rate), change=change)
+
+
+def drift_of(
+    t: np.ndarray, rest: np.ndarray, lead_in: np.ndarray, end: np.ndarray, drop: float
+) -> Drift:
+    """How the zero moves between two windows in which the hand is free.
+
+    Args:
+        t: Times [s], shape (S,).
+        rest: The sensor's force without the tool's load [N], shape (S, 3).
+        lead_in, end: The windows, shape (S,).
+        drop: Of the force at the release [N].
+    """
+    if end.sum() < 20:
+        return Drift(np.zeros(3))
+    change = rest[end].mean(axis=0) - rest[lead_in].mean(axis=0)
+    size = float(np.linalg.norm(change))
+    rate = change / (t[end].mean() - t[lead_in].mean())
+    along = rest @ (change / max(size, 1e-12))
+    courses = [course(t[which], along[which]) for which in (lead_in, end)]
+    error = float(np.hypot(courses[0][2], courses[1][2]))
+    speed = float(np.linalg.norm(rate))
+    other = any(
+        abs(slope - speed) > max(SURE * spread, OTHER * speed) for slope, spread, _ in courses
+    )
+    if size > max(MATTERS * drop, SURE * error) and other:
+        return Drift(np.zeros(3), change, error, steady=False)
+    return Drift(rate, change, error)
+
+
+def course(t: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
+    """Slope of x (S,) [N/s], its standard error, and that of the mean [N], by means of blocks."""
+    count = int((t[-1] - t[0]) / BLOCK)
+    if count < LEAST_BLOCKS:
+        return 0.0, np.inf, float(np.std(x))
+    blocks = np.array_split(np.arange(len(t)), count)
+    at, averages = (np.array([v[block].mean() for block in blocks]) for v in (t - t.mean(), x))
+    slope, middle = np.polyfit(at, averages, 1)
+    spread = float(np.sqrt(np.sum((averages - slope * at - middle) ** 2) / (count - 2)))
+    # A slow swing makes neighbouring blocks alike: there are fewer that are independent.
+    left = averages - slope * at - middle
+    alike = np.clip(np.sum(left[1:] * left[:-1]) / max(np.sum(left**2), 1e-30), 0, 0.95)
+    spread *= np.sqrt((1 + alike) / (1 - alike))
+    return float(slope), spread / float(np.sqrt(np.sum(at**2))), spread / float(np.sqrt(count))
+
+
 LONGEST = 0.1  # s of either sign
-BLOCK = 0.2  # s in which errors of the smoothed force go together
+SMOOTH = 0.2  # s in which errors of the smoothed force go together
 LEAST_LOAD = 8.0  # standard deviations by which the tool's mass must show
 WINDOW = 0.15  # s of the fits by which the load changes
 STEP = 0.002  # s of the grid on which the load is tabulated
@@ -214,7 +284,7 @@ def estimate_tool_inertia(pull: Pull, tool: Tool | None) -> ToolInertia | None:
     table = np.hstack([load, change])
     t, force, late = t[free], raw[free], t[free] > release
 
-    blocks = np.unique((t / BLOCK).astype(int), return_inverse=True)[1]
+    blocks = np.unique((t / SMOOTH).astype(int), return_inverse=True)[1]
     delay, mass, errors = 0.0, 0.0, np.full(2, np.inf)
     for _ in range(ROUNDS):  # Gauss-Newton
         at = t + delay  # stamps that are late say later what happens now
@@ -274,7 +344,7 @@ class FlatTop:
 
 def flat_top(pull: Pull) -> FlatTop | None:
     """Where the noise disappears at an extreme value of the raw force, before the release."""
-    t, raw = pull.force_time, pull.recording.wrench.values
+    t, raw = pull.force_time, pull.force
     free, until = t < pull.grasp - MARGIN, t < pull.release.time - MARGIN / 5
     count = max(LEAST_SAMPLES, round(NOISE_WINDOW / pull.recording.wrench.period))
     if free.sum() < count or until.sum() < 2 * count:

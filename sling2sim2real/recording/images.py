@@ -1,22 +1,23 @@
-"""Pictures to arrays: colour to BGR, depth to metres."""
+"""Pictures to arrays: colour to BGR, depth to metres. Pillow unpacks them, and notices damage."""
 
 from __future__ import annotations
 
 import io
 import struct
-from typing import NamedTuple
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import cv2
 import numpy as np
-from cv2.utils import logging
 from PIL import Image
 
 from sling2sim2real.recording.messages import Picture
 
-FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "BMP", "JPEG2000", "AVIF")  # of what OpenCV unpacks
+FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "BMP", "JPEG2000", "AVIF")
 KNOWN = "JPEG, PNG, WebP, TIFF, BMP, JPEG 2000 or AVIF"
 JPEG_END = b"\xff\xd9"  # behind it is what a driver sends of its buffer
-LARGEST = 2**24  # pixels; a damaged size must not ask for more memory than this
+GREY = ("L", "I;16", "I", "F")  # modes of Pillow that are kept as they are
+LARGEST = 2**24  # pixels of a raw picture; a damaged size must not ask for more
 
 
 class Undecodable(Exception):
@@ -27,64 +28,36 @@ class Unsupported(Undecodable):
     """An image of a kind that is not known, so all of its topic are undecodable."""
 
 
-class Header(NamedTuple):
-    """What the first bytes tell: width and height, Pillow's mode and name of the format."""
-
-    size: tuple[int, int]
-    mode: str
-    format: str
-
-
-def header(data: np.ndarray) -> Header:
-    """Without unpacking. Raises Undecodable."""
+@contextmanager
+def opened(data: np.ndarray) -> Iterator[Image.Image]:
+    """A packed picture, whose header is read. Raises Undecodable, also of what is done with it."""
     try:
         with Image.open(io.BytesIO(data.data), formats=FORMATS) as image:
-            return Header(image.size, image.mode, str(image.format))
+            yield image
+    except Undecodable:
+        raise
     except Exception as error:  # damaged bytes make Pillow raise anything
         kind = type(error).__name__  # its words hold addresses, which differ from run to run
         raise Undecodable(f"damaged image, or neither {KNOWN} ({kind})") from error
 
 
-def unpacked(data: np.ndarray, flags: int, kind: str) -> np.ndarray:
-    """Pixels as `cv2.imdecode` has them; what follows on the picture's end is passed over.
+def unpacked(data: np.ndarray, kind: str) -> np.ndarray:
+    """Pixels, grey (H, W) or RGB (H, W, 3); what follows on the picture's end is passed over.
 
     Args:
         data: uint8, shape (bytes,).
-        flags: OpenCV's.
         kind: What the message says that it is.
 
     Raises:
         Undecodable: It is damaged, cut off or too large.
     """
-    (width, height), _, format = header(data)
-    if width * height > LARGEST:
-        raise Undecodable(f"an image of {width} x {height} pixels ({kind})")
-    if format == "JPEG" and JPEG_END not in data.tobytes():  # OpenCV may fill it up with grey
-        raise Undecodable(f"JPEG is cut off ({kind})")
-    if format == "PNG":
-        _expect_whole(data, kind)
-    level = logging.setLogLevel(logging.LOG_LEVEL_SILENT)  # what it would say is said here
-    try:
-        image = cv2.imdecode(data, flags)
-    except cv2.error:
-        image = None
-    finally:
-        logging.setLogLevel(level)
-    if image is None:
-        raise Undecodable(f"damaged {format} ({kind})")
-    return image
+    with opened(data) as image:
+        if image.format == "JPEG" and JPEG_END not in data.tobytes():  # grey would fill it up
+            raise Undecodable(f"JPEG is cut off ({kind})")
+        if image.mode == "1":
+            return np.asarray(image.convert("L"))
+        return np.asarray(image if image.mode in GREY else image.convert("RGB"))
 
-
-def _expect_whole(data: np.ndarray, kind: str) -> None:
-    """A PNG's chunks and their checksums, which OpenCV does not look at. Raises Undecodable."""
-    try:
-        with Image.open(io.BytesIO(data.data), formats=("PNG",)) as image:
-            image.verify()
-    except Exception as error:  # damaged bytes make Pillow raise anything
-        raise Undecodable(f"damaged PNG ({kind})") from error
-
-
-__all__ = ["LARGEST", "Undecodable", "Unsupported"]
 
 # compressed_depth_image_transport: format, depth quantisation A and B
 DEPTH_HEADER = struct.Struct("<iff")
@@ -114,7 +87,8 @@ def is_depth(picture: Picture) -> bool:
     if picture.format.startswith(NAMED):
         return True
     try:
-        return header(picture.data).mode == "I;16"
+        with opened(picture.data) as image:
+            return image.mode == "I;16"
     except Undecodable:
         return False
 
@@ -124,7 +98,11 @@ def color(picture: Picture) -> np.ndarray:
     if picture.format:
         if "compressedDepth" in picture.format:
             raise Unsupported(f"format {picture.format!r} is depth, not colour")
-        return unpacked(picture.data, cv2.IMREAD_COLOR, picture.format)
+        pixels = unpacked(picture.data, picture.format)
+        if pixels.ndim == 3:
+            return cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR)
+        grey = pixels if pixels.dtype == np.uint8 else (pixels >> 8).astype(np.uint8)
+        return cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
     if picture.encoding not in COLORS:
         raise Unsupported(f"colour encoding {picture.encoding!r} is not known, use rgb8 or bgr8")
     channels, conversion = COLORS[picture.encoding]
@@ -142,7 +120,7 @@ def depth(picture: Picture) -> np.ndarray:
         return _metres(_rows(picture, DEPTHS[picture.encoding], 1))
     floats = picture.format.startswith("32FC1")
     if "compressedDepth" not in picture.format:
-        pixels = unpacked(picture.data, cv2.IMREAD_UNCHANGED, picture.format)
+        pixels = unpacked(picture.data, picture.format)
         if floats and pixels.dtype != np.float32:
             raise Unsupported(f"depth format {picture.format!r} is not known, use compressedDepth")
         return _metres(pixels)
@@ -156,7 +134,7 @@ def depth(picture: Picture) -> np.ndarray:
         raise Undecodable("compressedDepth without a picture")
     if "rvl" in picture.format.lower():
         raise Unsupported("compressedDepth in RVL is not read: record it in PNG")
-    packed = unpacked(body, cv2.IMREAD_UNCHANGED, picture.format)
+    packed = unpacked(body, picture.format)
     if not floats:
         return _metres(packed)
     _, scale, offset = DEPTH_HEADER.unpack_from(picture.data.data)
@@ -167,15 +145,12 @@ def depth(picture: Picture) -> np.ndarray:
 
 def grey(data: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """A grey PNG of this width and height to uint8, shape (H, W). Raises Undecodable."""
-    try:
-        pixels, mode, format = header(data)
-    except Undecodable as error:
-        raise Undecodable(f"is not a grey PNG of 8 bits or 1: {error}") from error
-    if mode not in ("L", "1") or format != "PNG":
-        raise Undecodable("is not a grey PNG of 8 bits or 1")
-    if pixels != size:
-        raise Undecodable("is of {} x {} pixels, not of {} x {}".format(*pixels, *size))
-    return unpacked(data, cv2.IMREAD_GRAYSCALE, "png")
+    with opened(data) as image:
+        if image.mode not in ("L", "1") or image.format != "PNG":
+            raise Undecodable("is not a grey PNG of 8 bits or 1")
+        if image.size != size:
+            raise Undecodable("is of {} x {} pixels, not of {} x {}".format(*image.size, *size))
+    return unpacked(data, "png")
 
 
 def size_of(picture: Picture) -> tuple[int, int] | None:
@@ -186,7 +161,8 @@ def size_of(picture: Picture) -> tuple[int, int] | None:
     if "compressedDepth" in picture.format:
         data = _body(data)
     try:
-        return header(data).size
+        with opened(data) as image:
+            return image.size
     except Undecodable:
         return None
 

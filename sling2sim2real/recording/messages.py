@@ -58,7 +58,10 @@ class Spool:
         """Keep some bytes; what gives them back."""
         place, self._size = self._size, self._size + len(data)
         self._file.write(data.data)
-        return lambda: np.frombuffer(os.pread(self._file.fileno(), len(data), place), np.uint8)
+        return partial(self._get, place, len(data))
+
+    def _get(self, place: int, size: int) -> np.ndarray:
+        return np.frombuffer(os.pread(self._file.fileno(), size, place), np.uint8)
 
 
 class Unreadable(str):
@@ -86,6 +89,7 @@ class Topic:
     log_times: list[int] = field(default_factory=list)
     readings: dict[str, list[Reading | Unreadable]] = field(default_factory=dict)
     problem: str = ""
+    readers: dict[str, Read] = field(default_factory=dict)
     decode: Decoder | None = None
     spool: Spool | None = None
 
@@ -93,8 +97,9 @@ class Topic:
     def of(cls, name: str, schema: Schema, encoding: str, spool: Spool | None = None) -> Topic:
         """One without messages; pictures stay in memory without a spool."""
         topic = cls(name, replace(schema, name=printable(schema.name)), encoding, spool=spool)
-        topic.readings = {what: [] for what in TYPES.get(topic.kind, {})}
-        if topic.readings:
+        topic.readers = TYPES.get(topic.kind, {})
+        topic.readings = {what: [] for what in topic.readers}
+        if topic.readers:
             try:
                 topic.decode = decoder(schema, encoding)
             except Exception as error:  # the parsers raise many kinds
@@ -113,7 +118,7 @@ class Topic:
         if self.decode is None:
             return
         message = _tried(self.decode, payload)
-        for what, read in TYPES[self.kind].items():
+        for what, read in self.readers.items():
             reading = message if isinstance(message, Unreadable) else _tried(read, message)
             if self.spool and isinstance(reading, Reading) and isinstance(reading.value, Picture):
                 stored = replace(reading.value, content=self.spool.put(reading.value.data))
@@ -380,12 +385,7 @@ def read_calibration(message: Message) -> Reading:
     distortion = np.array(first_of(message, "d", "D"), float).ravel()
     frame = frame_of(message)
     camera = Camera(int(message.width), int(message.height), matrix, distortion, frame)
-    across, down = (max(1, int(getattr(message, f"binning_{axis}", 1))) for axis in "xy")
-    roi = getattr(message, "roi", None)
-    sides = (roi.x_offset, roi.y_offset, roi.width, roi.height) if roi else (0, 0, 0, 0)
-    x, y, width, height = map(int, sides)
-    model = str(message.distortion_model)
-    value = Calibration(camera, model, rectified, (across, down), (x, y, width, height))
+    value = Calibration(camera, str(message.distortion_model), rectified)
     return _reading(message, value)
 
 

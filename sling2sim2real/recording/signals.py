@@ -10,10 +10,9 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode import signal
 from sling2sim2real.episode.phases import TURN
 from sling2sim2real.episode.window import Window, window_of
-from sling2sim2real.recording.events import Pull
+from sling2sim2real.recording.events import MARGIN, Pull
 from sling2sim2real.recording.force import ToolInertia, band_force
 from sling2sim2real.recording.frames import turned
-from sling2sim2real.recording.grasp import MARGIN
 from sling2sim2real.recording.motion import Motion, expect_dense, interpolated
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import Tool
@@ -43,7 +42,6 @@ class SignalFacts:
             where the latter says nothing of it.
         zero_error: Standard deviation of its length [N].
         zero_steady: The zero drifts steadily, if at all: `drift` is 0 where it does not.
-        zeroed: When the sensor was zeroed while recording, since the window's start [s].
         noise: Standard deviation of one force sample [N].
         hold_force: Mean just before the release, frame O [N].
         peak_force: Largest of the filtered force while the band is held [N].
@@ -61,7 +59,6 @@ class SignalFacts:
     zero_change: list[float] | None
     zero_error: float
     zero_steady: bool
-    zeroed: list[float]
     noise: float
     hold_force: list[float]
     peak_force: float
@@ -124,7 +121,6 @@ def signals_of(pull: Pull, params: Settings, inertia: ToolInertia | None = None)
     tool, episode, recording = params.setup.tool, params.episode, pull.recording
     inertia = inertia if tool is None else None
     expect_dense(recording.wrench)
-    # Off the force so far: the sensor's new zeros. Here: inertia, then tool, bias and drift.
     t, force, motion = pull.force_time, pull.force, pull.motion
     grasp, release = pull.grasp, pull.release
     until = (motion.time >= t[0]) & (motion.time <= release.time)
@@ -160,7 +156,6 @@ def signals_of(pull: Pull, params: Settings, inertia: ToolInertia | None = None)
         zero_change=None if band.zero.change is None else band.zero.change.tolist(),
         zero_error=band.zero.error,
         zero_steady=band.zero.steady,
-        zeroed=[step.time - start for step in pull.zeroed],
         noise=release.noise,
         hold_force=band.hold.tolist(),
         peak_force=float(np.linalg.norm(pulled, axis=1).max()),

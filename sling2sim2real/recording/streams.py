@@ -14,9 +14,8 @@ pose, is alone far off those around it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -42,8 +41,8 @@ from sling2sim2real.settings.lab import SetupParams
 from sling2sim2real.settings.recording import DelayParams
 
 STREAMS = ("wrench", "pose", "gripper", *CAMERAS)
+DELAYED = {"pose": ["pose"], "camera": CAMERAS}  # roles of each of episode.delays
 ABSURD = 1e6  # N, m, m/s, rad: nothing here is as large
-TIMED = ("gripper",)  # roles for which log_time will do
 # What a lone message may be off the four around it: a knock or a fall lasts for more than one.
 LONE = {"wrench": 30.0, "pose": 0.05}  # N, m
 MOST_LONE = 0.05  # share of the messages that may be alone: more are the sensor's noise, or units
@@ -56,11 +55,11 @@ REASON, LOSS, LINE = 100, 300, 1000  # characters: why a message is damaged, a l
 FAR = 1.0  # s from a stamp to those around it: it is damage
 WINDOW = 9  # messages around one
 SET_BACK = 0.01  # s by which both times of a message go back where a clock was set
+LEAST = 5  # percentile of the delays of receipt: some log_times may be damage
 TOLERANCE = 0.5  # s between the clocks of two topics: transport and drivers take less
 SECONDS = 5  # of least delays: fewer tell nothing of a clock's course
 
 Values = TypeVar("Values", bound=Any)
-Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -249,9 +248,8 @@ def recording_of(
 
 def late_by(delays: DelayParams | None) -> dict[str, float]:
     """Seconds by which the stamps of each role are given to be late; none where nothing is."""
-    given = {"pose": delays and delays.pose, "camera": delays and delays.camera}
-    roles = {"pose": ("pose",), "camera": CAMERAS}
-    return {role: late for name, late in given.items() if late for role in roles[name]}
+    given = {name: getattr(delays, name, None) for name in DELAYED}
+    return {role: late for name, late in given.items() if late for role in DELAYED[name]}
 
 
 def explained(error: UserError, path: Path, losses: list[str], pull: str = "") -> UserError:
@@ -276,177 +274,163 @@ def streams_of(
     Raises:
         UserError: for a topic that cannot be used, in one line.
     """
-    notes: list[str] = []
-    readers = {role: partial(_read, role, choice) for role, choice in chosen.items()}
-    topics = _usable(readers, notes)
-    for role, raw in topics.items():
-        raw.arrive()
-        raw.stamp = raw.stamp - round((late or {}).get(role, 0.0) * 1e9)
-    _expect_one_clock(topics, late or {})
-    streams = _usable({role: partial(_sorted, raw) for role, raw in topics.items()}, notes)
-    wrench = topics["wrench"]
-    for role in set(streams) - {"wrench", *TIMED}:
-        clock = course_of(topics[role], wrench)
-        streams[role] = replace(streams[role], clock=clock)
-    origin = int(streams["wrench"].stamp[0])
-    first = min(stream.stamp[0] for stream in streams.values())
-    last = max(stream.stamp[-1] for stream in streams.values())
-    for stream in streams.values():
-        stream.notes.extend(_gaps(stream, origin, first, last))
-    return streams, notes
-
-
-def _usable(made: Mapping[str, Callable[[], Value]], notes: list[str]) -> dict[str, Value]:
-    """What is made of each role, without the optional roles of which nothing can be made."""
-    results = {}
-    for role, make in made.items():
+    late, remarks = late or {}, []
+    made: dict[str, tuple[Stream[Any], np.ndarray]] = {}
+    for role, choice in chosen.items():
         try:
-            results[role] = make()
+            made[role] = _stream_of(role, choice, late.get(role, 0.0))
         except UserError as error:
             if role not in OPTIONAL:
                 raise
-            notes.append(f"{error}: done without it")
-    return results
+            remarks.append(f"{error}: done without it")
+    remarks += _expect_one_clock(made, late)
+    streams = {role: stream for role, (stream, _) in made.items()}
+    wrench, wrench_log = made["wrench"]
+    for role in set(streams) - {"wrench", *OPTIONAL}:
+        clock = course_of(streams[role].stamp, made[role][1], wrench.stamp, wrench_log)
+        streams[role] = replace(streams[role], clock=clock)
+    first = min(stream.stamp[0] for stream in streams.values())
+    last = max(stream.stamp[-1] for stream in streams.values())
+    for stream in streams.values():
+        stream.notes.extend(_gaps(stream, int(wrench.stamp[0]), int(first), int(last)))
+    return streams, remarks
 
 
 @dataclass
-class RawTopic:
-    """One topic as it was read, in the order of the file.
+class _Raw:
+    """Messages of a topic, of which some are dropped.
 
     Attributes:
         values: Shape (S, C), or of pictures (S,).
-        reason: Why the first damaged message cannot be read.
+        lost: How many were dropped, by why.
     """
 
-    role: str
-    choice: Choice
-    frame: str
+    topic: str
     stamp: np.ndarray
     log: np.ndarray
     values: np.ndarray
     lost: Counter[str]
-    reason: str = ""
-    notes: list[str] = field(default_factory=list)
-    disorder: int = 0
-    bursts: pace.Bursts | None = None
-
-    @property
-    def topic(self) -> str:
-        return self.choice.topic.name
 
     def keep(self, which: np.ndarray) -> None:
-        """Only these messages: a mask or an order."""
+        """Only these: a mask or an order."""
         self.stamp, self.log, self.values = self.stamp[which], self.log[which], self.values[which]
 
     def drop(self, which: np.ndarray, why: str) -> None:
+        """Not these. Raises UserError where fewer than two are left."""
         if which.any():
             self.lost[why] += int(which.sum())
             self.keep(~which)
+        if len(self.stamp) < 2:
+            lost = f" ({self.words()})" if self.lost else ""
+            raise UserError(f"topic {self.topic} has fewer than two readable messages{lost}")
 
     def words(self) -> str:
-        """How many messages were lost, and why."""
-        words = ", ".join(f"{count} {why}" for why, count in sorted(self.lost.items()))
-        return f"{words}; the first damaged one: {self.reason}" if self.reason else words
-
-    def arrive(self) -> None:
-        """Drop stamps that are damage, and put bursts evenly, in the order in which messages came.
-
-        Raises UserError where both times go back.
-        """
-        ways = np.maximum(np.diff(self.stamp), np.diff(self.log))
-        if ways.min(initial=0) < -SET_BACK * 1e9:
-            i = int(np.argmin(ways))
-            raise UserError(
-                f"{self.topic}: its messages go back by {-ways[i] * 1e-9:.3f} s after"
-                f" {(self.stamp[i] - self.stamp[0]) * 1e-9:.2f} s: record again without setting the"
-                " machine's clock; if the file is only out of order, `mcap sort` it"
-            )
-        self.drop(_outliers(self.stamp), "far off in time")
-        self.disorder = int(np.count_nonzero(np.diff(self.stamp) < 0))
-        if self.role in CAMERAS:
-            return
-        even = pace.without_bursts(self.stamp, self.log, self.values)
-        if even is not None:
-            self.stamp, self.bursts = even
-            self.disorder = 0
-            every = f"{self.bursts.interval * 1e-6:.3g} ms"
-            side = "before" if self.bursts.before else "after"
-            self.notes.append(
-                f"stamped in bursts of {self.bursts.count} every {every}: spread evenly over the"
-                f" time {side} each"
-            )
+        return ", ".join(f"{count} {why}" for why, count in sorted(self.lost.items()))
 
 
-def _read(role: str, choice: Choice) -> RawTopic:
-    """Read a topic's messages. Raises UserError where fewer than two are left."""
-    stamps, logs, values, frames, lost, reason = [], [], [], [], Counter(), ""
-    for log_time, reading in choice.messages:
+def _read(role: str, choice: Choice) -> tuple[_Raw, str]:
+    """What can be read of a topic's messages, in the order of the file, and their frame."""
+    lost, damage, rows = Counter(), "damaged", []
+    for log, reading in choice.messages:
         if isinstance(reading, Unreadable):
-            lost["damaged"] += 1
-            reason = reason or shortened(printable(reading), REASON)
+            if damage == "damaged":
+                damage += f" (the first: {shortened(printable(reading), REASON)})"
+            lost[damage] += 1
         elif role not in CAMERAS and not all(abs(x) < ABSURD for x in reading.value):
             lost["not finite"] += 1
         else:
-            stamps.append(reading.stamp or 0)
-            logs.append(log_time)
-            values.append(reading.value)
-            frames.append(reading.frame)
-    frame = Counter(frames).most_common(1)[0][0] if frames else ""
-    stamp, log = np.array(stamps, np.int64), np.array(logs, np.uint64).astype(np.int64)
-    array = np.array(values, dtype=object if role in CAMERAS else float)
-    raw = RawTopic(role, choice, frame, stamp, log, array, lost, reason)
+            rows.append((reading.stamp or 0, log, reading.frame, reading.value))
+    stamps, logs, frames, values = zip(*rows, strict=True) if rows else ((), (), (), ())
+    name, stamp = choice.topic.name, np.array(stamps, np.int64)
     if len(stamp) and not stamp.any():
-        if role not in TIMED:
-            raise UserError(f"topic {raw.topic} has no header stamps, record with time stamps")
-        raw.stamp = log.copy()
-        raw.notes.append("no header stamps: log_time is used")
+        raise UserError(f"topic {name} has no header stamps, record with time stamps")
+    log = np.array(logs, np.uint64).astype(np.int64)
+    array = np.array(values, dtype=object if role in CAMERAS else float)
+    raw = _Raw(name, stamp, log, array, lost)
+    frame = Counter(frames).most_common(1)[0][0] if frames else ""
     raw.drop(np.array([other != frame for other in frames], bool), "in another frame")
     raw.drop(raw.stamp == 0, "without a stamp")
-    _expect_some(raw)
-    return raw
+    return raw, frame
 
 
-def _expect_some(raw: RawTopic) -> None:
-    if len(raw.stamp) < 2:
-        reasons = f" ({raw.words()})" if raw.lost else ""
-        raise UserError(f"topic {raw.topic} has fewer than two readable messages{reasons}")
-
-
-def _sorted(raw: RawTopic) -> Stream[Any]:
-    if raw.disorder > 0:
-        raw.notes.append(f"{counted(raw.disorder)} out of order, sorted by stamp")
+def _stream_of(role: str, choice: Choice, late: float) -> tuple[Stream[Any], np.ndarray]:
+    """One topic, sorted, and its times of receipt [ns]. Raises UserError where it is of no use."""
+    (raw, frame), notes, hold = _read(role, choice), [], None
+    _expect_forward(raw)
+    raw.drop(_outliers(raw.stamp), "far off in time")
+    disorder = int(np.count_nonzero(np.diff(raw.stamp) < 0))
+    numbers = role not in CAMERAS
+    even = pace.without_bursts(raw.stamp, raw.log, raw.values) if numbers else None
+    if even is not None:
+        raw.stamp, bursts = even
+        every, side = 1e-6 * bursts.interval, "before" if bursts.before else "after"
+        notes.append(
+            f"stamped in bursts of {bursts.count} every {every:.3g} ms: spread evenly over the time"
+            f" {side} each"
+        )
+    elif disorder:
+        notes.append(f"{counted(disorder)} out of order, sorted by stamp")
+    raw.stamp = raw.stamp - round(late * 1e9)
     raw.keep(np.argsort(raw.stamp, kind="stable"))
     raw.drop(np.diff(raw.stamp, prepend=raw.stamp[0] - 1) == 0, "with the stamp of another")
-    _expect_some(raw)
-    hold = None
-    if raw.role not in CAMERAS:
-        if raw.role in LONE and raw.choice.convert is None:
-            raw.drop(_lone(raw), "far off those around")
-        if raw.choice.convert is not None:
-            raw.values = raw.choice.convert(raw.values)
-        hold = pace.hold_of(raw.stamp, raw.values) if raw.role in LONE else None
-    if hold:
+    if role in LONE and choice.convert is None:
+        raw.drop(_lone(raw, role), "far off those around")
+    if choice.convert is not None:
+        raw.values = choice.convert(raw.values)
+    if role in LONE and (hold := pace.hold_of(raw.stamp, raw.values)):
         retained = pace.first_of_each(raw.stamp, raw.values, hold)
         times = f"{len(retained) / np.count_nonzero(retained):.0f}"
-        raw.notes.append(f"each value is sent {times} times: the repeats are left out")
+        notes.append(f"each value is sent {times} times: the repeats are left out")
         raw.keep(retained)
     if raw.lost:
-        raw.notes.append(f"lost {raw.words()}")
-    delay = float(np.median(raw.log - raw.stamp) * 1e-9)
-    lost, hold = sum(raw.lost.values()), (hold or 0.0) * 1e-9
-    return Stream(
-        raw.topic, raw.frame, raw.stamp, raw.values, delay, lost, raw.notes, raw.bursts, hold
+        notes.append(f"lost {raw.words()}")
+    stream = Stream(
+        topic=raw.topic,
+        frame=frame,
+        stamp=raw.stamp,
+        values=raw.values,
+        receipt_delay=float(np.median(raw.log - raw.stamp) * 1e-9),
+        lost=sum(raw.lost.values()),
+        notes=notes,
+        bursts=even and even[1],
+        hold=1e-9 * (hold or 0.0),
     )
+    return stream, raw.log
 
 
-def _lone(raw: RawTopic) -> np.ndarray:
+def _expect_forward(raw: _Raw) -> None:
+    """Raises UserError where both times go back."""
+    ways = np.maximum(np.diff(raw.stamp), np.diff(raw.log))
+    if ways.min() < -SET_BACK * 1e9:
+        i = int(np.argmin(ways))
+        raise UserError(
+            f"{raw.topic}: its messages go back by {-ways[i] * 1e-9:.3f} s after"
+            f" {(raw.stamp[i] - raw.stamp[0]) * 1e-9:.2f} s: record again without setting the"
+            " machine's clock; if the file is only out of order, `mcap sort` it"
+        )
+
+
+def _outliers(stamp: np.ndarray) -> np.ndarray:
+    """Which stamps [ns], in the order of arrival, are far from all around them; shape (S,).
+
+    By a running median, as Hampel's filter, with a fixed limit; also the first two and last two.
+    """
+    if len(stamp) < WINDOW:
+        return np.zeros(len(stamp), bool)
+    middle = np.median(stamp.astype(float))
+    usual = median_filter(stamp - middle, WINDOW, mode="mirror") + middle
+    ways = np.diff(stamp)
+    limit = max(FAR * 1e9, 10 * float(np.median(ways[ways > 0])) if (ways > 0).any() else 0.0)
+    return np.abs(stamp - usual) > limit
+
+
+def _lone(raw: _Raw, role: str) -> np.ndarray:
     """Single values of force or place far from those around them, shape (S,).
 
     By a running median of five, as Hampel's filter, with a fixed limit.
     """
-    values = raw.values[:, :3]
-    limit = LONE[raw.role]
-    if raw.role == "pose":
+    values, limit = raw.values[:, :3], LONE[role]
+    if role == "pose":
         limit = max(limit, FASTEST * 1e-9 * float(np.median(np.diff(raw.stamp))))
     around = median_filter(values, (5, 1), mode="nearest")
     lone = np.abs(values - around).max(axis=1) > limit
@@ -470,58 +454,26 @@ def _gaps(stream: Stream[Any], origin: int, first: int, last: int) -> list[str]:
     return notes
 
 
-def _outliers(stamp: np.ndarray) -> np.ndarray:
-    """Which stamps [ns], in the order of arrival, are far from all around them; shape (S,).
+def _expect_one_clock(
+    made: dict[str, tuple[Stream[Any], np.ndarray]], late: Mapping[str, float]
+) -> list[str]:
+    """Leave out the optional topics that are on another clock; say which, in words.
 
-    By a running median, as Hampel's filter, with a fixed limit; also the first two and last two.
+    By the least delays of receipt. Raises UserError about the other topic that is furthest off.
     """
-    if len(stamp) < WINDOW:
-        return np.zeros(len(stamp), bool)
-    middle = np.median(stamp.astype(float))
-    usual = median_filter(stamp - middle, WINDOW, mode="mirror") + middle
-    ways = np.diff(stamp)
-    limit = max(FAR * 1e9, 10 * float(np.median(ways[ways > 0])) if (ways > 0).any() else 0.0)
-    return np.abs(stamp - usual) > limit
-
-
-def _least(raw: RawTopic, start: int) -> dict[int, int]:
-    """Least delay of receipt in each second of log_time [ns]."""
-    second, delay = (raw.log - start) // 10**9, raw.log - raw.stamp
-    order = np.lexsort([delay, second])
-    keys, first = np.unique(second[order], return_index=True)
-    return dict(zip(keys.tolist(), delay[order][first].tolist(), strict=True))
-
-
-def _leads(raw: RawTopic, wrench: RawTopic) -> tuple[np.ndarray, np.ndarray]:
-    """Seconds in which both have messages, and the excess of the least delays then [s]."""
-    start = int(min(raw.log.min(), wrench.log.min()))
-    mine, others = _least(raw, start), _least(wrench, start)
-    common = np.array(sorted({*mine} & {*others}))
-    return common, np.array([mine[k] - others[k] for k in common]) * 1e-9
-
-
-def _expect_one_clock(topics: dict[str, RawTopic], late: Mapping[str, float]) -> None:
-    """Raises UserError about the topic whose clock is furthest from the median of all topics'.
-
-    A gripper on another clock is read by log_time.
-    """
-    wrench, offsets = topics["wrench"], {}
-    for role, raw in topics.items():
-        leads = _leads(raw, wrench)[1]
-        alone = (raw.log - raw.stamp).min() - (wrench.log - wrench.stamp).min()
-        offsets[role] = float(np.median(leads)) if len(leads) else float(alone) * 1e-9
-    middle = float(np.median(list(offsets.values())))
-    for role in TIMED:
-        if role in topics and abs(offsets.pop(role)) > TOLERANCE:
-            topics[role].stamp = topics[role].log.copy()
-            topics[role].notes.append("on another clock: log_time is used")
-    off = {role: middle - offset for role, offset in offsets.items()}
-    if np.ptp(list(off.values())) <= TOLERANCE:
-        return
-    worst = max(off, key=lambda role: abs(off[role]))
-    names, roles = {"pose": ["pose"], "camera": CAMERAS}, []
-    for name in names:
-        seen = [late.get(role, 0.0) - offsets[role] for role in names[name]]
+    least = {role: np.percentile(log - stream.stamp, LEAST) for role, (stream, log) in made.items()}
+    delay = {role: 1e-9 * (least[role] - least["wrench"]) for role in made}
+    middle, remarks = float(np.median(list(delay.values()))), []
+    for role in {*OPTIONAL} & {*made}:
+        if abs(delay.pop(role) - middle) > TOLERANCE:
+            stream, _ = made.pop(role)
+            remarks.append(f"{stream.topic}: on another clock: done without it")
+    if np.ptp(list(delay.values())) <= TOLERANCE:
+        return remarks
+    worst = max(delay, key=lambda role: abs(delay[role] - middle))
+    roles = []
+    for name, of_name in DELAYED.items():
+        seen = [late.get(role, 0.0) - delay[role] for role in of_name]
         if np.ptp(seen) < TOLERANCE and max(map(abs, seen)) > TOLERANCE / 2:
             roles.append(f"episode.delays.{name}: {np.mean(seen):.3f}")
     cure = ""
@@ -529,21 +481,30 @@ def _expect_one_clock(topics: dict[str, RawTopic], late: Mapping[str, float]) ->
         cure = f"; or set {' and '.join(roles)} in params.yaml, by the times of receipt, which is"
         cure += " good to some hundredths of a second alone"
     raise UserError(
-        f"the stamps of {topics[worst].topic} are {off[worst]:+.3f} s off the other topics' clock,"
-        f" record all topics with one clock{cure}"
+        f"the stamps of {made[worst][0].topic} are {middle - delay[worst]:+.3f} s off the other"
+        f" topics' clock, record all topics with one clock{cure}"
     )
 
 
-def course_of(raw: RawTopic, wrench: RawTopic) -> Clock:
-    """How a clock goes against the wrench's: a line or a step, whichever fits better."""
-    time, lead = _leads(raw, wrench)
+def course_of(
+    stamp: np.ndarray, log: np.ndarray, wrench: np.ndarray, wrench_log: np.ndarray
+) -> Clock:
+    """How a clock goes against the wrench's: a line or a step, whichever fits better.
+
+    Args:
+        stamp, log: Of the topic, and `wrench`, `wrench_log` of the force [ns], shapes (S,).
+    """
+    start = int(min(log.min(), wrench_log.min()))
+    mine, others = _least(log - start, log - stamp), _least(wrench_log - start, wrench_log - wrench)
+    time = np.array(sorted({*mine} & {*others}))
+    lead = np.array([mine[k] - others[k] for k in time]) * 1e-9
     count = len(time)
     if count < SECONDS:
         return Clock()
-    slope, start = np.polyfit(time, lead, 1)
-    left = np.sum((lead - start - slope * time) ** 2)
+    slope, offset = np.polyfit(time, lead, 1)
+    left = np.sum((lead - offset - slope * time) ** 2)
     error = np.sqrt(left / (count - 2) / np.sum((time - time.mean()) ** 2))
-    span = float(np.ptp(wrench.stamp)) * 1e-9
+    span = float(np.ptp(wrench)) * 1e-9
     best = Clock(-float(slope) * span, float(error) * span)
     for k in range(2, count - 1):
         parts = lead[:k], lead[k:]
@@ -553,3 +514,11 @@ def course_of(raw: RawTopic, wrench: RawTopic) -> Clock:
             scatter = np.sqrt(rest / (count - 2) * (1 / k + 1 / (count - k)))
             best = Clock(-float(parts[1].mean() - parts[0].mean()), float(scatter), float(time[k]))
     return best
+
+
+def _least(log: np.ndarray, delay: np.ndarray) -> dict[int, int]:
+    """Least delay of receipt in each second [ns]."""
+    second = log // 10**9
+    order = np.lexsort([delay, second])
+    keys, first = np.unique(second[order], return_index=True)
+    return dict(zip(keys.tolist(), delay[order][first].tolist(), strict=True))

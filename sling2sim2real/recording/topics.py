@@ -10,8 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import islice
+from functools import cached_property, partial
 from os.path import commonprefix
 
 import numpy as np
@@ -61,19 +60,24 @@ class Choice:
     why: str = ""
     convert: Convert | None = None
 
+    @property
+    def name(self) -> str:
+        return self.topic.name
+
+    @property
+    def readings(self) -> list[Reading]:
+        """Those of its messages that can be read."""
+        return [reading for _, reading in self.messages if isinstance(reading, Reading)]
+
+    @cached_property
     def typical(self) -> Reading:
         """The first message of the frame and kind that most have. Raises UserError."""
-        some = _readable(reading for _, reading in self.messages)
+        some = self.readings[:TRIES]
         if not some:
-            reasons = [reading for _, reading in self.messages if isinstance(reading, Unreadable)]
-            reason = reasons[-1] if reasons else "all are damaged"
-            raise UserError(f"{self.topic.name} has fewer than two readable messages ({reason})")
+            reason = next((why for _, why in self.messages[::-1]), "all are damaged")
+            raise UserError(f"{self.name} has fewer than two readable messages ({reason})")
         kinds = [(reading.frame, getattr(reading.value, "kind", None)) for reading in some]
         return some[kinds.index(Counter(kinds).most_common(1)[0][0])]
-
-
-def _readable(readings, most: int = TRIES) -> list[Reading]:
-    return list(islice((one for one in readings if isinstance(one, Reading)), most))
 
 
 @dataclass(frozen=True)
@@ -141,46 +145,32 @@ ROLES = {
 }
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A topic that could play a role."""
-
-    role: Role
-    choice: Choice
-    typical: Reading
-
-    @property
-    def name(self) -> str:
-        return self.choice.topic.name
-
-    @property
-    def rate(self) -> float:
-        """Messages a second, by when they were logged."""
-        times = self.choice.topic.log_times
-        span = (max(times) - min(times)) * 1e-9
-        return (len(times) - 1) / span if span > 0 else 0.0
-
-    @property
-    def hints(self) -> list[str]:
-        """The role's hints in the topic's name: whole words, or long ones within words."""
-        name = self.name.lower()
-        return [h for h in self.role.hints if h in _words(name) or (len(h) > 3 and h in name)]
-
-    def standing(self) -> tuple:
-        """What decides: measured, not spare, no doubts, a likely rate, type, whether hints."""
-        kind, words = self.choice.topic.kind, {*_words(self.name)}
-        return (
-            not words & {*self.role.doubts} & {*COMMANDS},
-            kind not in self.role.spare,
-            -len(words & {*self.role.doubts}),
-            self.rate >= self.role.rate,
-            -self.role.types.index(kind),
-            bool(self.hints),
-        )
+def _words(name: str) -> set[str]:
+    return {*re.findall("[a-z]+", name.lower())}  # infra1 is infra
 
 
-def _words(name: str) -> list[str]:
-    return re.findall("[a-z]+", name.lower())  # infra1 is infra
+def _rate(topic: Topic) -> float:
+    """Messages a second, by when they were logged."""
+    span = (max(topic.log_times) - min(topic.log_times)) * 1e-9
+    return (len(topic.log_times) - 1) / span if span > 0 else 0.0
+
+
+def _hints(role: Role, name: str) -> list[str]:
+    """The role's hints in a topic's name: whole words, or long ones within words."""
+    return [h for h in role.hints if h in _words(name) or (len(h) > 3 and h in name.lower())]
+
+
+def _standing(role: Role, topic: Topic) -> tuple:
+    """What decides: measured, not spare, no doubts, a likely rate, type, whether hints."""
+    doubts = _words(topic.name) & {*role.doubts}
+    return (
+        not doubts & {*COMMANDS},
+        topic.kind not in role.spare,
+        -len(doubts),
+        _rate(topic) >= role.rate,
+        -role.types.index(topic.kind),
+        bool(_hints(role, topic.name)),
+    )
 
 
 def choose(
@@ -216,7 +206,7 @@ def choose(
 def camera_of(chosen: dict[str, Choice], role: str) -> Camera:
     """The camera of the images of `role`, color or depth. Raises UserError."""
     info, image = chosen[f"{role}_info"], chosen[role]
-    return camera_from(info.topic.name, info.typical().value, image.topic.name, _size(image))
+    return camera_from(info.name, info.typical.value, image.name, _size(image))
 
 
 class _Chooser:
@@ -232,19 +222,20 @@ class _Chooser:
         name = getattr(self.setup.topics, role)
         if name is not None:
             return self._named(role, name)
-        fitting = [self._candidate(role, topic) for topic in self.topics]
-        candidates = [topic for topic in fitting if topic is not None and self._suits(role, topic)]
+        fitting = [self._read(role, topic) for topic in self.topics]
+        fitting = [choice for choice in fitting if choice and self._suits(role, choice)]
         if role.endswith("_info"):
-            return self._info(candidates, role.removesuffix("_info"), chosen)
-        if not candidates:
+            return self._info(fitting, role.removesuffix("_info"), chosen)
+        if not fitting:
             return None
         if role == "depth":
-            candidates = _nearest(candidates, chosen["color"])
-        best = max(candidates, key=lambda c: (c.standing(), len(c.choice.messages)))
-        alike = {_source(c.name) for c in candidates if c.standing() == best.standing()}
+            fitting = _nearest(fitting, chosen["color"])
+        best = max(fitting, key=lambda c: (_standing(ROLES[role], c.topic), len(c.messages)))
+        standing = _standing(ROLES[role], best.topic)
+        alike = {_source(c.name) for c in fitting if _standing(ROLES[role], c.topic) == standing}
         if len(alike) > 1:
             self.ambiguous.append(f"setup.topics.{role} {few(sorted(alike), SHOWN)}")
-        return replace(best.choice, why=_why(best, candidates))
+        return replace(best, why=_why(ROLES[role], best, fitting))
 
     def lacking(self, role: str) -> UserError:
         what = ROLES[role].what
@@ -272,84 +263,73 @@ class _Chooser:
         if not fitting:
             raise UserError(f"{where}: {name} is a {_type(topics[0])}, not {' or '.join(types)}")
         largest = max(fitting, key=lambda topic: len(topic.log_times))
-        candidate = self._candidate(role, largest, named=True)
-        if candidate is None:
+        choice = self._read(role, largest, named=True)
+        if choice is None:
             problem = (self.problems or [f"{name} has no messages, or fingers only"])[0]
             raise UserError(f"{where}: {problem}")
-        if role in CAMERAS and (problem := undecodable(role, candidate.choice)):
+        if role in CAMERAS and (problem := undecodable(role, choice)):
             raise UserError(f"{where}: {name}: {problem}")
-        return replace(candidate.choice, why=where)
+        return replace(choice, why=where)
 
-    def _candidate(self, role: str, topic: Topic, named: bool = False) -> Candidate | None:
-        """None, with a word in `problems`, for a topic of the right type that is of no use."""
-        if topic.kind not in ROLES[role].types:
+    def _read(self, role: str, topic: Topic, named: bool = False) -> Choice | None:
+        """What a topic says for a role; None, with a word in `problems`, where it is of no use."""
+        what = {*ROLES[role].shows} & {*topic.readings}
+        if not what:
             return None
         try:
             if topic.problem:
                 raise UserError(topic.problem)
-            choice = self._read(role, topic, named)
-            return choice and Candidate(ROLES[role], choice, choice.typical())
+            if role == "gripper":
+                choice = _gripper(topic, named)
+            elif what == {"joints"}:
+                choice = _arm(topic, self.setup)
+            elif what == {"transforms"}:
+                choice = None if _is_static(topic) else _hand(topic, self.setup, self.still)
+            else:
+                choice = Choice(topic, _all(topic, *what))
+            return choice if choice and choice.typical else None
         except UserError as error:
             self.problems.append(str(error))
             return None
 
-    def _read(self, role: str, topic: Topic, named: bool) -> Choice | None:
-        """What a topic says for a role; None where it is something else, which is no news.
-
-        Raises UserError where it would be if params said more.
-        """
-        (what,) = {*ROLES[role].shows} & {*topic.readings}
-        if role == "gripper":
-            return _gripper(topic, named)
-        if what == "joints":
-            return _arm(topic, self.setup)
-        if what == "transforms":
-            return None if _is_static(topic) else _hand(topic, self.setup, self.still)
-        return Choice(topic, _all(topic, what))
-
-    def _suits(self, role: str, candidate: Candidate) -> bool:
+    def _suits(self, role: str, choice: Choice) -> bool:
         """Pictures: whether they are colour or depth, and of a kind that can be decoded."""
         if role not in CAMERAS:
             return True
-        picture, named = candidate.typical.value, "depth" in candidate.name.lower()
+        picture, named = choice.typical.value, "depth" in choice.name.lower()
         deep = images.is_depth(picture) or (picture.encoding == "mono16" and named)
-        if deep != (role == "depth"):
-            if named and role == "depth" and picture.encoding:
-                what = f"encoding {picture.encoding!r} is no depth, {images.USE}"
-                self.problems.append(f"{candidate.name}: {what}")
-            return False
-        problem = undecodable(role, candidate.choice)
+        problem = None
+        if deep == (role == "depth"):
+            problem = undecodable(role, choice)
+        elif named and role == "depth" and picture.encoding:
+            problem = f"encoding {picture.encoding!r} is no depth, {images.USE}"
         if problem:
-            self.problems.append(f"{candidate.name}: {problem}")
-        return problem is None
+            self.problems.append(f"{choice.name}: {problem}")
+        return deep == (role == "depth") and not problem
 
-    def _info(
-        self, candidates: Sequence[Candidate], role: str, chosen: dict[str, Choice]
-    ) -> Choice | None:
+    def _info(self, infos: Sequence[Choice], role: str, chosen: dict[str, Choice]) -> Choice | None:
         """A camera info belongs to the images in whose folder it is, or with their frame and size.
 
         Depth may take the colour camera's where it is registered to colour: in its frame and size.
         """
         image, color = chosen[role], chosen["color"]
-        name, frame, size = image.topic.name, image.typical().frame, _size(image)
-        ranked = []
-        for candidate in candidates:
-            camera, choice = candidate.typical.value.camera, candidate.choice
-            beside = _beside(candidate.name, name)
-            of_color = _beside(candidate.name, color.topic.name)
-            beside_it = beside and (role == "color" or not of_color)
-            info_frame = camera.frame or (color.typical().frame if of_color else "")
-            fits = size is None or size == (camera.width, camera.height)
-            if beside_it or (info_frame == frame and (fits or beside)):
-                why = f"beside {name}" if beside else f"of the frame and size of {name}"
-                merit = beside_it, info_frame == frame, fits, beside, len(choice.messages)
-                ranked.append((merit, replace(choice, why=why)))
+        frame, size, ranked = image.typical.frame, _size(image), []
+        for info in infos:
+            camera = info.typical.value.camera
+            beside, of_color = _beside(info.name, image.name), _beside(info.name, color.name)
+            own = beside and (role == "color" or not of_color)
+            of_frame = (camera.frame or (color.typical.frame if of_color else "")) == frame
+            fits = size in (None, (camera.width, camera.height))
+            if own or (of_frame and (fits or beside)):
+                why = f"{'beside' if beside else 'of the frame and size of'} {image.name}"
+                merit = own, of_frame, fits, beside, len(info.messages)
+                ranked.append((merit, replace(info, why=why)))
             else:
                 pixels = f", {size[0]} x {size[1]}" if size else ""
                 self.problems.append(
-                    f"{candidate.name} is of frame {info_frame!r}, {camera.width} x"
-                    f" {camera.height} pixels, {name} of {frame!r}{pixels}: record the camera info"
-                    f" of those images, or name it in setup.topics.{role}_info"
+                    f"{info.name} is of frame {camera.frame!r}, {camera.width} x {camera.height}"
+                    f" pixels, {image.name} of {frame!r}{pixels}: record the camera info of those"
+                    f" images, or name it in setup.topics.{role}_info"
                 )
         return max(ranked, key=lambda entry: entry[0], default=(None, None))[1]
 
@@ -393,7 +373,8 @@ def _joints(topic: Topic, names: tuple[str, ...], frame: str | None = None) -> M
 
 def _joint_names(topic: Topic) -> list[tuple[str, ...]]:
     """Names in the first messages, the most frequent first. Raises UserError if there are none."""
-    counts = Counter(tuple(r.value) for r in _readable(topic.readings["joints"], JOINT_TRIES))
+    some = Choice(topic, _all(topic, "joints")).readings[:JOINT_TRIES]
+    counts = Counter(tuple(reading.value) for reading in some)
     names = [some for some, _ in counts.most_common() if some]
     if not names:
         raise UserError(f"{topic.name} has fewer than two readable messages (no positions)")
@@ -465,7 +446,7 @@ def _hand(topic: Topic, setup: SetupParams, still: TransformTree) -> Choice:
 
     Raises UserError where no such frame moves.
     """
-    some = _readable(topic.readings["transforms"], JOINT_TRIES)
+    some = Choice(topic, _all(topic, "transforms")).readings[:JOINT_TRIES]
     moving = {child: parent for reading in some for parent, child in reading.value}
     parents = still.parents | moving
     tools = [name for name in parents if {*name.lower().split("_")} & TOOLS]
@@ -502,15 +483,14 @@ def _hand(topic: Topic, setup: SetupParams, still: TransformTree) -> Choice:
 
 def _size(image: Choice) -> tuple[int, int] | None:
     """Width and height that most of the first pictures tell."""
-    some = _readable(reading for _, reading in image.messages)
-    sizes = Counter(size for reading in some if (size := images.size_of(reading.value)))
+    read = [images.size_of(reading.value) for reading in image.readings[:TRIES]]
+    sizes = Counter(size for size in read if size)
     return sizes.most_common(1)[0][0] if sizes else None
 
 
 def undecodable(role: str, choice: Choice) -> str | None:
     """Why none of some pictures of a topic can be decoded; None where one can."""
-    pictures = [reading for _, reading in choice.messages if isinstance(reading, Reading)]
-    reasons = Counter()
+    pictures, reasons = choice.readings, Counter()
     for k in np.unique(np.linspace(0, len(pictures) - 1, TRIES).astype(int)):
         try:
             getattr(images, role)(pictures[k].value)
@@ -528,12 +508,12 @@ def _source(topic: str) -> str:
     return topic.removesuffix("/compressed").removesuffix("/compressedDepth")
 
 
-def _nearest(depths: list[Candidate], color: Choice) -> list[Candidate]:
+def _nearest(depths: list[Choice], color: Choice) -> list[Choice]:
     """Those in the colour's frame, or else those that share the most folders with its topic."""
-    frame, name = color.typical().frame, color.topic.name
+    frame = color.typical.frame
 
-    def near(depth: Candidate) -> tuple[bool, int]:
-        folders = (topic.split("/")[:-1] for topic in (depth.name, name))
+    def near(depth: Choice) -> tuple[bool, int]:
+        folders = (name.split("/")[:-1] for name in (depth.name, color.name))
         return bool(frame) and depth.typical.frame == frame, len(commonprefix([*folders]))
 
     most = max(map(near, depths))
@@ -546,13 +526,14 @@ def _beside(info: str, image: str) -> bool:
     return any(folder) and folder in (parts[:-1], parts[:-2])
 
 
-def _why(best: Candidate, candidates: list[Candidate]) -> str:
-    if len(candidates) == 1:
-        return f"the only {best.choice.topic.kind} for {best.role.what.partition(' (')[0]}"
-    named = f"named {' '.join(best.hints)}, " if best.hints else ""
-    others = sorted({candidate.name for candidate in candidates} - {best.name})[:2]
+def _why(role: Role, best: Choice, fitting: list[Choice]) -> str:
+    if len(fitting) == 1:
+        return f"the only {best.topic.kind} for {role.what.partition(' (')[0]}"
+    hints = _hints(role, best.name)
+    named = f"named {' '.join(hints)}, " if hints else ""
+    others = sorted({choice.name for choice in fitting} - {best.name})[:2]
     rest = f"; not {', '.join(others)}" if others else ""
-    return f"of {len(candidates)} topics: {named}{best.rate:.0f} Hz{rest}"
+    return f"of {len(fitting)} topics: {named}{_rate(best.topic):.0f} Hz{rest}"
 
 
 def transforms_of(container: Container) -> TransformTree:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import AfterValidator, create_model, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    ValidationInfo,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
 from sling2sim2real.base.imported import is_import
 from sling2sim2real.base.parameters import THETA, Parameter, added_by, parameters
 from sling2sim2real.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
 
 Step = Annotated[float, Range(1e-5, 0.05)]
-Bound = TypeVar("Bound", bound=float)
 KTop = Annotated[int, Range(1, 50)]
 Law = Literal["neo_hookean", "rubber", "corotated"]  # of the band's material
 # What each has beside the parameters of every law, and how far its box may reach.
@@ -44,26 +50,26 @@ class SlingParams(Section):
         return self
 
 
-class Box(Section, Generic[Bound]):
-    """One axis of the search; `Bound` says how far the box may reach."""
+class Box(Section):
+    """One axis of the search."""
 
-    low: Bound
-    high: Bound
-    scale: Literal["log", "linear"]
+    scale: ClassVar[str]  # linear or log, as the table says
+    low: float
+    high: float
 
     @model_validator(mode="after")
     def _low_below_high(self) -> Box:
         if not self.low < self.high:
             raise refusal("low must be less than high")
-        if self.scale == "log" and self.low <= 0:
-            raise refusal("low must be above 0 on a log scale")
         return self
 
 
 def _axis(row: Parameter) -> Any:
-    kind = Box[Annotated[float, Range(*row.reach)]]
+    bound = Annotated[float, Range(*row.reach)]
+    kind = create_model(row.name, __base__=Box, low=bound, high=bound)
+    kind.scale = row.scale
     low, high = row.box
-    return kind, kind(low=low, high=high, scale=row.scale)
+    return kind, kind(low=low, high=high)
 
 
 _BOXES = {row.name: _axis(row) for row in parameters("neo_hookean") if row.name in THETA}
@@ -74,7 +80,7 @@ class ParameterBoxes(create_model("_ParameterBoxes", __base__=Section, **_BOXES)
 
 
 class LossParams(Section):
-    chamfer: Literal["symmetric", "clouds"] = "symmetric"
+    chamfer: Literal["symmetric", "clouds"] = "clouds"
     median_window: Annotated[int, Range(1, 101)] = 7
 
     @model_validator(mode="after")
@@ -150,7 +156,7 @@ Bounds = Annotated[tuple[Value, Value], LIST]
 class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
-    law: Law = "neo_hookean"
+    law: Law = "corotated"
     search: Annotated[str, _one_of(SEARCHES, "function")] = "multistart"
     engine: Annotated[str, _one_of(ENGINES, "function")] = "sling"
     settings: dict[str, Setting] = {}
@@ -159,12 +165,21 @@ class MethodDefaults(Section):
     k_top: KTop | None = None
     mounting: bool = True
     covariance: bool = True
+    weights: Weights = Weights()
 
 
 class MethodParams(MethodDefaults):
     """What is weighed, what is searched, and how."""
 
-    weights: Weights = Weights()
+    bounds: dict[str, Bounds] = Field(default={}, validate_default=True)
+
+    @field_validator("bounds")
+    @classmethod
+    def _law_has_its_box(cls, bounds: dict[str, Bounds], given: ValidationInfo) -> dict:
+        """What a law adds is searched within the table's box, unless the method says another."""
+        added = [row for row in parameters(given.data.get("law", "")) if row.law]
+        fixed = given.data.get("fixed", {})
+        return {row.name: row.box for row in added if row.name not in fixed} | bounds
 
     @model_validator(mode="after")
     def _keys_belong_to_the_search(self) -> MethodParams:
@@ -193,16 +208,6 @@ class MethodParams(MethodDefaults):
             raise refusal(f"search: {POSTERIOR} wants engine: {OUR_ENGINE}")
         return self
 
-    @model_validator(mode="after")
-    def _law_has_its_box(self) -> MethodParams:
-        for name, reach in LAWS[self.law].items():
-            if name not in self.bounds and name not in self.fixed:
-                raise refusal(
-                    f"bounds: {name} is missing, [low, high] within {list(reach)}, which the law"
-                    f" {self.law} searches"
-                )
-        return self
-
 
 METHODS = {
     PAPER: MethodParams(),  # the paper's
@@ -210,7 +215,6 @@ METHODS = {
         search=POSTERIOR,
         law="rubber",
         fixed={row.name: row.fixed for row in parameters("rubber") if row.fixed is not None},
-        bounds={row.name: row.box for row in parameters("rubber") if row.law},
     ),
 }
 

@@ -26,6 +26,7 @@ FAILURES = {
     Outcome.NOT_CONVERGED: "the simulation did not converge",
     Outcome.SLIPPED: "the band slipped out of the fingers",
 }
+FRICTION = 0.8  # of the pads, whose opening time the fall of the force tells
 BOW, GRID, AROUND = 5e-6, 1e-3, 0.03  # m, s, s: of the steps while the hand holds
 GRASP_BLEND = 0.5  # s in which the held node moves from where the band hung to the hand's path
 
@@ -49,6 +50,27 @@ class Rollouts:
     center_line: np.ndarray
     failure: list[str | None]
     iterations: np.ndarray | None = None
+
+
+def with_recorded_pads(
+    sling: ClampedBand, episode: Episode, friction: float = FRICTION
+) -> ClampedBand:
+    """The band in pads that open in the time in which the force falls as fast as recorded.
+
+    From the slip on friction falls with the pads' force, which is gone after the opening time: the
+    held force is gone sooner, by its share of the friction of closed pads. An episode that does
+    not say how fast its force fell leaves the lab's own time.
+
+    Args:
+        friction: That the pads are taken to have while the force falls.
+    """
+    fall = episode.metadata.get("preprocessing", {}).get("release_fall")
+    if not fall:
+        return sling
+    last = np.flatnonzero(episode.time < episode.release_time)[-20:]
+    held = np.linalg.norm(episode.force[last], axis=1).max()
+    opening = np.clip(fall * 2 * friction * sling.grip_force / held, 5e-4, 0.05)
+    return replace(sling, finger_opening_time=float(opening))
 
 
 def schedule_of(sling: ClampedBand, episode: Episode, refine: int = 1) -> Schedule:

@@ -24,7 +24,7 @@ def test_it_is_the_loss_of_the_method(world, episode) -> None:
     objective = Objective(world, [episode, episode], method="by_two")
     assert objective.names == ("youngs_modulus", "dynamic_friction")
     unit = np.array([[0.3, 0.5], [0.6, 0.9], [0.4, 0.7]])
-    sling = ClampedBand.of(world.band, settings.setup, settings.sling)
+    sling = ClampedBand.of(world.band, settings.setup, settings.sling, law=method.law)
     loss = EpisodeLoss.of(settings, "by_two", episode, sling)
     space = SearchBox.of_method(settings, "by_two")
     whole = [space.unit_of(objective.theta(point).parameters)[0] for point in unit]

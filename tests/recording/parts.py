@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import struct
 from dataclasses import replace
 from pathlib import Path
@@ -52,10 +51,3 @@ def split(file: Path, folder: Path, cuts: tuple[float, ...], stem: str = "my") -
         parts.append(folder / f"{stem}_{number}.mcap")
         write_again(within, parts[-1])
     return parts
-
-
-def metadata(folder: Path, *names: str) -> None:
-    """As rosbag2 writes it, but for what is not read."""
-    fields = {"version": 5, "storage_identifier": "mcap", "relative_file_paths": list(names)}
-    text = json.dumps({"rosbag2_bagfile_information": fields})  # JSON is YAML
-    (folder / "metadata.yaml").write_text(text)

@@ -118,19 +118,6 @@ def test_rectified_images_have_the_camera_p() -> None:
         assert camera(message, image=image).matrix[0, 0] == 60
 
 
-def test_a_region_of_interest_and_binning() -> None:
-    """A pixel of the image sees what the middle of its bin sees."""
-    region = SimpleNamespace(x_offset=10, y_offset=6, width=40, height=36)
-    whole = camera(info())
-    part = camera(info(roi=region), size=(40, 36))
-    np.testing.assert_allclose(part.project(POINTS) + [10, 6], whole.project(POINTS))
-    halved = camera(info(roi=region, binning_x=2, binning_y=3), size=(20, 12))
-    np.testing.assert_allclose(
-        (halved.project(POINTS) + 0.5) * [2, 3] - 0.5 + [10, 6], whole.project(POINTS)
-    )
-    assert (halved.width, halved.height) == (20, 12)
-
-
 @pytest.mark.parametrize(
     ("message", "size", "words"),
     [

@@ -59,8 +59,7 @@ def test_a_hand_that_moves_before_the_pull_is_no_noise(checked, every) -> None:
     values = wrench.values[0] + smooth + shaken[:, None]
     changed = replace(wrench, stamp=wrench.stamp[::every], values=values[::every])
     recording = replace(checked.pull.recording, wrench=changed)
-    odd = replace(checked.pull, recording=recording, force_time=changed.seconds(recording.origin))
-    assert flat_top(odd) is None
+    assert flat_top(replace(checked.pull, recording=recording)) is None
 
 
 @pytest.mark.fires("units")
@@ -88,18 +87,26 @@ def test_a_filtered_force(checked, params, count) -> None:
     assert odd.pull.release.error > late / 2
 
 
-@pytest.mark.fires("zeroed")
-def test_zeros_are_named(checked, params) -> None:
+@pytest.mark.parametrize("at", [0.3, 1.2, 2.0])
+def test_a_sensor_that_is_zeroed_while_recording_is_refused(checked, params, at) -> None:
+    """While free, slack or drawn: its own values then are taken off."""
+
+    def zeroed(t, values):
+        level = values[(t > at - 0.05) & (t < at)].mean(axis=0)
+        return values - np.outer(t > at, level)
+
+    try:
+        found = of_signals(with_force(checked, zeroed, params), params)
+    except UserError as error:
+        assert "zeroed" in str(error)
+    else:
+        assert any(finding.about == "zero" and finding.refused for finding in found)
+
+
+@pytest.mark.parametrize(("share", "refused"), [(0.05, False), (0.2, True)])
+def test_a_zero_that_does_not_return(checked, params, share, refused) -> None:
     release = checked.pull.release.time
-    zero = with_force(checked, lambda t, values: values - 3.0 * (t > 0.4)[:, None], params)
-    assert abouts(of_signals(zero, params)) - {"pause"} == {"zeroed"}
-    assert not zero.signals.facts.slips
-    hold_force = np.linalg.norm(checked.signals.facts.hold_force)
-    for share, refused in ((0.05, False), (0.2, True)):
-        off = share * hold_force / np.sqrt(3)
-        late = release + 0.01
-        odd = with_force(
-            checked, lambda t, x, by=off, late=late: x + by * (t > late)[:, None], params
-        )
-        (message,) = (finding for finding in of_signals(odd, params) if finding.about == "zero")
-        assert message.refused == refused and "after the release" in message.what
+    by = share * np.linalg.norm(checked.signals.facts.hold_force) / np.sqrt(3)
+    odd = with_force(checked, lambda t, x: x + by * (t > release + 0.01)[:, None], params)
+    (message,) = (finding for finding in of_signals(odd, params) if finding.about == "zero")
+    assert message.refused == refused and "after the release" in message.what

@@ -10,7 +10,7 @@ import pytest
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.phases import phases
 from sling2sim2real.recording.build import episode_of, process_recording
-from sling2sim2real.recording.release import find_release, find_releases
+from sling2sim2real.recording.events import find_release, find_releases
 from tests.project import with_
 from tests.recording.conftest import written
 from validation.recordings.bag import Truth
@@ -75,7 +75,7 @@ def test_it_is_one_pull_whose_events_are_found(done) -> None:
     signals = pull.signals
     assert pull.whole.start + signals.release_time == pytest.approx(truth.release, abs=1e-3)
     assert pull.whole.start + signals.grasp_time == pytest.approx(truth.grasp, abs=0.021)
-    assert not signals.facts.slips and not signals.facts.zeroed
+    assert not signals.facts.slips
 
 
 def test_the_window_follows_the_interaction(done, params) -> None:

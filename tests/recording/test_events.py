@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.grasp import find_grasp
-from sling2sim2real.recording.release import find_release, find_releases
+from sling2sim2real.recording.events import find_grasp, find_release, find_releases
+from sling2sim2real.recording.motion import Motion
 
 DIRECTION = np.array([0.3, -0.8, 0.52])
 
@@ -120,8 +121,12 @@ def test_two_pulls_are_refused_unless_the_fingers_tell() -> None:
     assert abs(find_release(t, force, gripper(1.0, 7.53)).time - 7.5) <= 1e-3
 
 
-def resting(t: np.ndarray):
-    return t, np.zeros((len(t), 3))
+def moving(t: np.ndarray, path: np.ndarray) -> Motion:
+    return Motion(t, path, Rotation.identity(len(t)), float(np.median(np.diff(t))))
+
+
+def resting(t: np.ndarray) -> Motion:
+    return moving(t, np.zeros((len(t), 3)))
 
 
 def gripper(closes: float, opens: float):
@@ -145,7 +150,7 @@ def lifted(t: np.ndarray, at: float) -> np.ndarray:
 
 def test_without_a_gripper_the_lift_tells() -> None:
     t = np.arange(0, 9, 0.01)
-    assert find_grasp(None, (t, lifted(t, 1.0)), 7.5) == pytest.approx(1.03, abs=0.02)
+    assert find_grasp(None, moving(t, lifted(t, 1.0)), 7.5) == pytest.approx(1.03, abs=0.02)
     with pytest.raises(UserError, match="no grasp"):
         find_grasp(None, resting(t), 7.5)
 
@@ -153,14 +158,14 @@ def test_without_a_gripper_the_lift_tells() -> None:
 def test_a_gripper_topic_that_comes_late_does_not_move_the_grasp_into_the_lift() -> None:
     t = np.arange(0, 9, 0.01)
     late = gripper(1.3, 7.83)  # by 0.3 s, while the hand lifts from 1.02 s on
-    assert find_grasp(late, (t, lifted(t, 1.02)), 7.5) == pytest.approx(1.02, abs=0.03)
+    assert find_grasp(late, moving(t, lifted(t, 1.02)), 7.5) == pytest.approx(1.02, abs=0.03)
 
 
 def test_a_gripper_topic_that_starts_after_the_grasp_leaves_it_to_the_lift() -> None:
     t, opening = gripper(0.0, 7.53)
     seen = t > 3
-    path = lifted(t, 1.0)
-    assert find_grasp((t[seen], opening[seen]), (t, path), 7.5) == pytest.approx(1.03, abs=0.03)
+    hand = moving(t, lifted(t, 1.0))
+    assert find_grasp((t[seen], opening[seen]), hand, 7.5) == pytest.approx(1.03, abs=0.03)
 
 
 def test_a_band_that_slips_out_is_noticed() -> None:
@@ -181,9 +186,8 @@ def test_grasp_by_a_gripper_of_any_sign_and_unit(unit, lead) -> None:
     noise = np.random.default_rng(4).normal(0, 1e-3, len(times))
     gripper = times, UNITS[unit] * (open_ + noise) + (0.8 if UNITS[unit] < 0 else 0)
     release = find_release(t, force, gripper).time
-    path = np.zeros((len(t), 3))
-    assert find_grasp(gripper, (t, path), release) == pytest.approx(1.38, abs=0.05)
+    assert find_grasp(gripper, resting(t), release) == pytest.approx(1.38, abs=0.05)
     assert find_releases(t, force, gripper) == pytest.approx([7.5], abs=0.01)
     slipped = times, np.where(times > 7, gripper[1][340] - 0.05 * UNITS[unit], gripper[1])
     with pytest.raises(UserError, match="the gripper stays closed"):
-        find_grasp(slipped, (t, path), release)
+        find_grasp(slipped, resting(t), release)

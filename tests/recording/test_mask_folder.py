@@ -155,9 +155,9 @@ SPOILED = {
         "NAME: is not a grey PNG",
     ),
     "JPEG": (lambda mine: _instead(files(mine)[3], GREY, "jpeg"), "NAME: is not a grey PNG"),
-    "text": (lambda mine: files(mine)[3].write_text("mask"), "NAME: is not a grey PNG"),
-    "empty": (lambda mine: files(mine)[3].write_bytes(b""), "NAME: is not a grey PNG"),
-    "cut off": (lambda mine: _cut(files(mine)[3]), "NAME: damaged PNG"),
+    "text": (lambda mine: files(mine)[3].write_text("mask"), "NAME: damaged image"),
+    "empty": (lambda mine: files(mine)[3].write_bytes(b""), "NAME: damaged image"),
+    "cut off": (lambda mine: _cut(files(mine)[3]), "NAME: damaged image"),
     "all black": (
         lambda mine: [_instead(file, GREY) for file in files(mine)],
         "not found in 54 of 54 frames: check the camera's extrinsics and the masks",

@@ -13,7 +13,7 @@ from pipeline.params import Params, load
 from pipeline.params.run import UNIONS
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.settings import Settings
-from sling2sim2real.settings.identification import LAWS
+from sling2sim2real.settings.identification import LAWS, Weights
 from sling2sim2real.simulator.parameters import THETA
 from tests.project import BAND, DEFAULTS
 
@@ -100,6 +100,8 @@ def test_every_text_refuses_a_number() -> None:
 def test_the_file_has_every_key_of_the_library_and_its_default() -> None:
     """The defaults live in the models, which are no stage's dependency; DVC tracks the file."""
     content = Settings.default().model_dump(mode="json", exclude={"bands", "methods"})
+    assert not any(content["setup"]["topics"].values())
+    content["setup"]["topics"] = {}  # all are found
     delivered = {key: CONTENT[key] for key in content}
     assert delivered == content
     for name, method in Settings.default().methods.items():
@@ -166,7 +168,6 @@ REFUSED = [
     ("bands", {"band-1": CONTENT["bands"]["band1"]}, "bands.band-1: a name has"),
     ("bands.band1.source", "bag", "bands.band1.source: must be 'recording' or 'rig'"),
     ("parameters.youngs_modulus.low", 1e8, "parameters.youngs_modulus: low must be less"),
-    ("parameters.dynamic_friction", {"low": 0, "high": 1, "scale": "log"}, "above 0"),
     ("setup.draw_y", [-0.25, -0.45], "setup.draw_y: the first must be less"),
     ("setup.draw_y", -0.3, "setup.draw_y: must be a list"),
     ("setup.clamp_direction", [0, 0, 0.5], "setup.clamp_direction: the vector must have"),
@@ -198,7 +199,7 @@ REFUSED = [
     ("methods.de.k_top", 3, "methods.de: k_top and covariance are for search: multistart"),
     ("setup.foot_height", 0.52, "setup.foot_height: must be less than setup.fork_height"),
     ("setup.draw_z", [-0.52, -0.1], "setup.draw_z: must be above the floor"),
-    ("methods.de.law", "rubber", "methods.de: bounds: mooney_share is missing, [low, high] within"),
+    ("methods.de", {"law": "rubber", "bounds": {"flow": [0, 2]}}, "bounds.flow: must be [low, hi"),
     ("methods.de.fixed", {"poisson": 0.4}, "methods.de.fixed: poisson is not one of youngs_"),
     ("methods.de.fixed", {"poissons_ratio": 0.2}, "must be between 0.3 and 0.49, got 0.2"),
     ("methods.de.fixed", ALL_FIXED, "methods.de.fixed: names every parameter, so none is left"),
@@ -255,13 +256,13 @@ def test_one_entry_runs_all_its_stages(tmp_path: Path) -> None:
 
 
 def test_what_a_method_leaves_out_is_as_the_defaults_say() -> None:
-    weights = CONTENT["methods"]["de"]["weights"]
-    method = checked(changed(("methods", "new"), {"weights": weights})).methods["new"]
+    method = checked(changed(("methods", "new"), {})).methods["new"]
     assert (method.search, method.k_top, method.covariance) == ("multistart", None, True)
     assert (method.settings, method.fixed, method.bounds) == ({}, {}, {})
+    assert method.weights == Weights(geom=1.0, force=1.0, work=1.0)
     other = checked(changed(("method_defaults", "bounds"), {"poissons_ratio": [0.4, 0.49]})).methods
     assert other["no_work"].bounds == {"poissons_ratio": (0.4, 0.49)}
-    assert set(other["posterior"].bounds) == {*LAWS["rubber"]}
+    assert {*other["posterior"].bounds} == {"poissons_ratio", *LAWS["rubber"]}
     assert refusal(changed(("method_defaults", "k_top"), 0)).startswith(
         "params.yaml: method_defaults.k_top: must be between 1 and 50"
     )
@@ -279,9 +280,12 @@ def test_what_a_method_may_ask_for() -> None:
     section = {"search": "lab.search:Own", "settings": {"rate": 0.1, "steps": 3, "name": "x"}}
     whole = changed(("methods", "new"), base | section)
     assert checked(whole).methods["new"].settings["rate"] == 0.1
-    rubber = {"law": "rubber", "bounds": CONTENT["methods"]["posterior"]["bounds"]}
+    rubber = {"law": "rubber", "bounds": {"flow": [0.1, 0.9]}}
     rubber |= {"fixed": ALL_FIXED | {"softening": 0.0}}  # the rest of what the law adds is left
-    assert len(checked(changed(("methods", "de"), base | rubber)).methods["de"].fixed) == 6
+    method = checked(changed(("methods", "de"), base | rubber)).methods["de"]
+    assert len(method.fixed) == 6
+    assert method.bounds["flow"] == (0.1, 0.9) and method.bounds["mooney_share"] == (-0.3, 0.9)
+    assert {*method.bounds} == {*LAWS["rubber"]} - {"softening"}
 
 
 def test_targets_beyond_the_paper_area_are_refused_though_trained() -> None:
@@ -345,6 +349,12 @@ def test_any_damaged_text_is_accepted_or_refused_in_one_line(data: st.DataObject
 def test_names_with_control_characters_or_markup_are_refused_in_one_printable_line() -> None:
     """A prompt and a topic may be any text; what shows them cares for itself."""
     for place in (("bands",), ("methods",), ("setup",), ("setup", "topics")):
-        value = next(leaf for path, leaf in leaves(CONTENT) if path[: len(place)] == place)
+        values = (leaf for path, leaf in leaves(CONTENT) if path[: len(place)] == place)
+        value = next(values, "/topic")
         for name in ("x\x1b[2J", "<script>", "../x", "a\nb", "$x$"):
             assert refusal(changed((*place, name), value)).isprintable()
+
+
+def test_all_methods_of_the_paper_have_the_law_of_its_engine() -> None:
+    laws = {name: method.law for name, method in load(DEFAULTS).methods.items()}
+    assert laws.pop("posterior") == "rubber" and {*laws.values()} == {"corotated"}

@@ -16,7 +16,7 @@ import argparse
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 
@@ -30,12 +30,11 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.machine import processor
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.box import SearchBox
-from sling2sim2real.identification.posterior.likelihood import opening_time
 from sling2sim2real.settings import expect_known
 from sling2sim2real.settings.identification import MethodParams
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import aimed, recorded, sling_of
-from validation.campaigns.runner import OURS, PAPER
+from validation.campaigns.runner import PAPER
 from validation.campaigns.variants import LAST, rollouts_of_search, with_preset, with_variants
 from validation.density import calibrated_by
 from validation.paired import LEVEL, compared, mean_interval
@@ -44,6 +43,7 @@ from validation.reports import row, write_report
 
 WORK = Path("data/ablations")
 REPORT = Path("reports/validation/ablations.json")
+LARGE = Path("reports/validation/ablations-large.json")
 FIRST, SEEDS = 1001, 5  # rig seed of the first recording; search seeds on it
 
 
@@ -105,9 +105,7 @@ def aimed_and_launched(job: Job, work: Path, preset: str | None) -> dict:
         Episode.load(folder / "episode"),
         sling_of(params, job.band, job.method, folder),
     )
-    start, friction = time.perf_counter(), params.methods[OURS].fixed["dynamic_friction"]
-    # Pads open as fast as the recorded force fell; in a run only the density has them so.
-    sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
+    start = time.perf_counter()
     outcome, confidence = calibrated_by(params, job.method, sling, [episode])
     seconds, names = time.perf_counter() - start, SearchBox.of_method(params, job.method).names
     draws = aimed(outcome, params, params.trials.targets)
@@ -215,6 +213,8 @@ def report(args: argparse.Namespace, params: Params, count: int, results: list[d
     command = f"--workers {args.workers} --recordings {args.recordings} --seeds {args.seeds}"
     if args.preset:
         command += f" --preset {args.preset} --report {args.report}"
+    if args.methods != list(params.methods):
+        command += f" --methods {' '.join(args.methods)}"
     content = {
         "kind": "virtual",
         "asked": "What each part of the paper's method, and each baseline, changes in the distance"
@@ -295,7 +295,7 @@ def main() -> None:
     params = with_variants(load())
     parser = runner.parser(__doc__, REPORT, WORK)
     parser.add_argument("--preset", help="of presets/, its keys of `optimizer`")
-    parser.add_argument("--bands", nargs="+", default=list(params.run.rig))
+    parser.add_argument("--bands", nargs="+", default=list(params.run.floors))
     parser.add_argument("--methods", nargs="+", default=list(params.methods))
     parser.add_argument("--first", type=int, default=FIRST, help="rig seed of the first recording")
     parser.add_argument("--recordings", type=int, default=10, help="a band (default: 10)")

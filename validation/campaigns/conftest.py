@@ -38,7 +38,8 @@ def record(request) -> Callable[..., None]:
     def write(name: str, *, requested: str, met: bool, settings: dict, figures: dict) -> None:
         content = {"asked": requested, "met": met, "settings": settings, "figures": figures}
         content |= environment("cpu", "make validate")
-        alone = f"python -m pytest -m validation -n 0 validation/campaigns/{request.path.name}"
+        options = "-m validation -n 0 --hypothesis-profile default"  # quick is that of tests/
+        alone = f"python -m pytest {options} validation/campaigns/{request.path.name}"
         path = ROOT / "reports/validation" / f"{name}.json"
         write_json(path, plain(content | {"alone": alone}, digits=5))
 

@@ -77,9 +77,8 @@ def recorded(recording: str, work: Path, folder: Path | None) -> Path:
 
 
 def checked(path: Path, recording: str) -> tuple[list[dict], s2s.Episode | None]:
-    """What the checks find, each with its concern, and the episode where there is one."""
+    """What the checks find, and the episode where there is one."""
     from sling2sim2real.recording.build import episode_of, process
-    from sling2sim2real.recording.checks import CHECKS
     from sling2sim2real.recording.events import Part
     from sling2sim2real.recording.frames import geometry_of
     from sling2sim2real.recording.streams import read_recording
@@ -92,10 +91,10 @@ def checked(path: Path, recording: str) -> tuple[list[dict], s2s.Episode | None]
         episode = episode_of(done, band)
     except UserError as error:
         text = str(error).removeprefix(f"{path}: ")
-        return [{"about": "", "concern": "", "what": text, "refused": True}], None
+        return [{"about": "", "what": text, "refused": True}], None
     findings = [
-        {"about": name, "concern": CHECKS[name].concern, "what": what, "refused": False}
-        for name, what in ((finding.about, finding.what) for finding in done.findings)
+        {"about": finding.about, "what": finding.what, "refused": False}
+        for finding in done.findings
     ]
     return findings, episode
 
@@ -149,7 +148,7 @@ def tried(case: Faulty, work: Path, folder: Path | None) -> dict:
         findings, episode = checked(path, case.recording)
     if episode is None:
         return {"findings": findings, "outcome": REFUSED}
-    if any(finding["concern"] in fault.concerns for finding in findings):
+    if any(finding["about"] in fault.checks for finding in findings):
         return {"findings": findings, "outcome": CAUTIONED}
     sound = start_of(case.recording, None, work, folder)
     try:

@@ -10,10 +10,9 @@ pytestmark = pytest.mark.validation
 
 MINE = {"source": "recording", "mass": 0.0408, "diameter": 0.012, "rest_length": 0.6}
 SET = {
-    **run_of([], ["paper"], ["bo"]),
-    "run.bands": ["orange"],
-    "run.ablations.bands": ["orange"],
+    **run_of({"orange": ["paper", "bo"]}, rig=False),
     "bands": {"orange": MINE},
+    "rig.bands": {"orange": None},
     "setup.fork_width": 0.31,
     "setup.fork_height": 0.8,
     "setup.projectile_mass": 0.05,
@@ -31,9 +30,12 @@ def test_what_a_user_sets_turns_no_test_red(tmp_path) -> None:
     copy_project(folder)
     copy = ProjectCopy(folder, PYTHONPATH=str(folder))
     copy.set(SET)
-    (folder / "data/evidence/orange.csv").write_text("draw_y_m,draw_z_m,landing_y_m\n-0.4,-0.2,2\n")
-    (folder / "data/theta/orange").mkdir(parents=True)
-    (folder / "data/theta/orange/posterior.json").write_text("{}")
+    for file, text in {
+        "data/launches/orange.csv": "draw_y,draw_z,error,landing,use\n-0.4,-0.2,,2,fit\n",
+        "data/theta/orange-paper.json": "{}",
+    }.items():
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file).write_text(text)
     copy.commit()
     message = copy(sys.executable, "-m", "pytest", "-q", "-m", "not slow and not validation")
     assert " passed" in message and "failed" not in message

@@ -7,7 +7,7 @@ from ruamel.yaml import YAML
 from pipeline.params import Params
 from sling2sim2real.base.code import ROOT
 from sling2sim2real.identification.search import rollouts_of
-from sling2sim2real.simulator.rubber import COROTATED
+from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 from validation.campaigns.runner import PAPER
 
 PRESETS = ROOT / "presets"
@@ -37,7 +37,7 @@ def with_variants(params: Params) -> Params:
         LAST: variant("small_batches"),
         "plain_adam": variant("plain_adam"),
         "no_clamp_calibration": paper.model_copy(update={"mounting": False}),
-        COROTATED: paper.model_copy(update={"law": COROTATED}),
+        NEO_HOOKEAN: paper.model_copy(update={"law": NEO_HOOKEAN}),
     }
     return params.model_copy(update={"methods": methods})
 

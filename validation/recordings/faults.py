@@ -29,14 +29,14 @@ class Fault:
     Attributes:
         family: Of the classes of public reports.
         unit: Of the sizes, from hardly visible to gross.
-        concerns: Whose checks name it (their concern in recording/checks.py).
+        checks: Those that name it (recording/checks.py).
         make: Does it to a recording.
     """
 
     family: str
     unit: str
     sizes: tuple[float, float, float]
-    concerns: tuple[str, ...]
+    checks: tuple[str, ...]
     make: Callable[[Bag, float], None]
 
 
@@ -271,11 +271,16 @@ def _optical(bag: Bag):
                 yield transform.transform
 
 
-TIMES, SEEN = ("times", "pictures", "camera"), ("camera", "pictures")
+CLOCKS = "clock", "delay", "release_pictures"
+SEEN = "coverage", "off_plane", "damaged", "extrinsics"
+FORCES = "range", "filter", "zero", "max_force", "release"
+HOLD, RATES = ("direction", "units"), ("gap", "stamps", "rate")
+FINGERS = ("gripper",)
+TIMES = CLOCKS + SEEN
 POSE_REPEATED, FORCE_REPEATED = partial(repeated, "pose"), partial(repeated, "force")
 FAULTS = {
     "camera_late": Fault("time", "ms", (5, 15, 60), TIMES, partial(late, "camera")),
-    "force_late": Fault("time", "ms", (3, 10, 30), ("times", "force"), partial(late, "force")),
+    "force_late": Fault("time", "ms", (3, 10, 30), CLOCKS + FORCES, partial(late, "force")),
     "pose_late": Fault("time", "ms", (3, 10, 30), TIMES, partial(late, "pose")),
     "camera_drifts": Fault("time", "ppm", (500, 1500, 3000), TIMES, partial(drifting, "camera")),
     "force_drifts": Fault("time", "ppm", (500, 1500, 3000), TIMES, partial(drifting, "force")),
@@ -283,27 +288,27 @@ FAULTS = {
     "robot_steps": Fault("time", "ms", (5, 60, 300), TIMES, partial(stepping, "robot")),
     "frozen": Fault("time", "s", (0.2, 0.4, 0.8), TIMES, frozen),
     "smeared": Fault("time", "", (0.4, 0.6, 0.8), TIMES, smeared),
-    "turned": Fault("force", "degrees", (3, 10, 20), ("force", "hold", "frames"), turned),
-    "zero_drifts": Fault("force", "N", (0.4, 0.9, 2.0), ("force",), zero_drifts),
-    "zero_stays_off": Fault("force", "N", (0.2, 0.6, 1.5), ("force",), zero_stays_off),
-    "zeroed": Fault("force", "s", (0.4, 3.0, 5.0), ("force",), zeroed),
-    "saturated": Fault("force", "", (0.95, 0.8, 0.6), ("force",), saturated),
-    "filtered": Fault("force", "samples", (10, 30, 100), ("force", "rates"), filtered),
-    "unit": Fault("force", "", (0.102, 0.2248, 1000), ("force", "hold"), in_unit),
-    "bursts": Fault("rates", "samples", (4, 16, 64), ("rates", "times"), in_bursts),
-    "force_repeated": Fault("rates", "samples", (3, 10, 33), ("rates",), FORCE_REPEATED),
-    "pose_repeated": Fault("rates", "samples", (10, 33, 100), ("rates",), POSE_REPEATED),
+    "turned": Fault("force", "degrees", (3, 10, 20), FORCES + HOLD + ("frames",), turned),
+    "zero_drifts": Fault("force", "N", (0.4, 0.9, 2.0), FORCES, zero_drifts),
+    "zero_stays_off": Fault("force", "N", (0.2, 0.6, 1.5), FORCES, zero_stays_off),
+    "zeroed": Fault("force", "s", (0.4, 3.0, 5.0), FORCES, zeroed),
+    "saturated": Fault("force", "", (0.95, 0.8, 0.6), FORCES, saturated),
+    "filtered": Fault("force", "samples", (10, 30, 100), FORCES + RATES, filtered),
+    "unit": Fault("force", "", (0.102, 0.2248, 1000), FORCES + HOLD, in_unit),
+    "bursts": Fault("rates", "samples", (4, 16, 64), RATES + CLOCKS, in_bursts),
+    "force_repeated": Fault("rates", "samples", (3, 10, 33), RATES, FORCE_REPEATED),
+    "pose_repeated": Fault("rates", "samples", (10, 33, 100), RATES, POSE_REPEATED),
     "depth_scaled": Fault("camera", "", (1.005, 1.01, 1.03), SEEN, depth_scaled),
     "focal_off": Fault("camera", "%", (0.5, 1, 3), SEEN, focal_off),
     "camera_moved": Fault("camera", "mm", (3, 6, 15), SEEN, camera_moved),
     "camera_turned": Fault("camera", "degrees", (0.3, 0.8, 2), SEEN, camera_turned),
-    "another_arm": Fault("roles", "N", (0.01, 0.05, 0.2), ("roles",), another_arm),
-    "dead_force": Fault("roles", "N", (0, 0.1, 5), ("roles",), dead_force),
-    "angle": Fault("conventions", "rad", (0.4, 0.8, 1.2), ("roles",), partial(opening_as, "angle")),
-    "percent": Fault("conventions", "", (1, 85, 100), ("roles",), partial(opening_as, "percent")),
-    "mirrored": Fault("conventions", "", (0.5, 1, 2), ("roles",), partial(opening_as, "mirrored")),
-    "stale": Fault("conventions", "s", (-3600, -20, 3600), ("times", "rates"), stale),
-    "padded": Fault("pictures", "bytes", (1, 16, 4096), ("pictures",), padded),
-    "torn": Fault("pictures", "", (0.1, 0.5, 1.0), ("pictures",), torn),
-    "depth_unit": Fault("causes", "", (0.1, 4, 10), ("pictures", "camera"), depth_scaled),
+    "another_arm": Fault("roles", "N", (0.01, 0.05, 0.2), FINGERS, another_arm),
+    "dead_force": Fault("roles", "N", (0, 0.1, 5), FINGERS, dead_force),
+    "angle": Fault("conventions", "rad", (0.4, 0.8, 1.2), FINGERS, partial(opening_as, "angle")),
+    "percent": Fault("conventions", "", (1, 85, 100), FINGERS, partial(opening_as, "percent")),
+    "mirrored": Fault("conventions", "", (0.5, 1, 2), FINGERS, partial(opening_as, "mirrored")),
+    "stale": Fault("conventions", "s", (-3600, -20, 3600), CLOCKS + RATES, stale),
+    "padded": Fault("pictures", "bytes", (1, 16, 4096), SEEN, padded),
+    "torn": Fault("pictures", "", (0.1, 0.5, 1.0), SEEN, torn),
+    "depth_unit": Fault("causes", "", (0.1, 4, 10), SEEN, depth_scaled),
 }  # fmt: skip

@@ -18,6 +18,7 @@ from sling2sim2real.drawing.styles import INK, Style, Styles
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.identification.results.theta import calibrated, parameters_of
+from sling2sim2real.simulator.interaction import with_recorded_pads
 from sling2sim2real.simulator.replay import replay
 
 SLACK, MARGIN = 0.05, 0.04  # of the peak force, below which the band is slack; of its draw [m]
@@ -41,7 +42,8 @@ def replayed(run: Run, result: Result) -> Replay:
     params, episode = run.params, run.episodes[result.band]
     sling = calibrated(params, result.band, result.theta, run.layout.clamps(result.pair))
     loss = EpisodeLoss.of(params, result.method, episode, sling)
-    done = replay(sling, episode, parameters_of(result.theta), params.force)
+    pads = with_recorded_pads(sling, episode)
+    done = replay(pads, episode, parameters_of(result.theta), params.force)
     if failure := done.rollouts.failure[0]:
         raise NotMade(run.layout.theta(result.pair), failure)
     return Replay(done.force[0], loss.frames(done.rollouts)[0])

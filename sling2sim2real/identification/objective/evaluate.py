@@ -31,7 +31,7 @@ from sling2sim2real.identification.objective.loss import TERMS, EpisodeLoss
 from sling2sim2real.identification.results.theta import sling_of_method
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import OUR_ENGINE
-from sling2sim2real.simulator.interaction import Rollouts, interact
+from sling2sim2real.simulator.interaction import Rollouts, interact, with_recorded_pads
 from sling2sim2real.simulator.model import ClampedBand
 
 SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
@@ -82,13 +82,14 @@ class Evaluator:
         """Keep what every batch needs.
 
         Args:
+            band: Its pads open as the recording shows, where that says it.
             devices: Of one kind; they share each batch evenly, in their order.
             workers: Threads on the CPU (the kernels release the interpreter); None: all cores.
             simulate: Called as `simulate(band, episode=, parameters=, device=)`.
             whole: One call a batch, on the first device.
         """
         self.box, self.loss = box, loss
-        self._band = band
+        self._band = with_recorded_pads(band, episode)
         self._simulate = partial(simulate, episode=episode)
         on_gpu = devices[0].startswith("cuda")
         self._slice = sys.maxsize if whole else SLICE["cuda" if on_gpu else "cpu"]

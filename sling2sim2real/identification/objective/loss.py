@@ -87,7 +87,7 @@ class EpisodeLoss:
     ) -> EpisodeLoss:
         """Make it from params.yaml's `loss`, `force` and `methods.<method>`.
 
-        None: of geometry and force alone, for a part of an episode.
+        None: of geometry, of what the camera sees, and force alone, for a part of an episode.
         """
         plain = {"geom": 1.0, "force": 1.0, "work": 0.0}
         return cls(
@@ -97,7 +97,7 @@ class EpisodeLoss:
             weights=dict(params.methods[method].weights) if method else plain,
             cutoff=cutoff_hz(params.force.cutoff, params.force.cutoff_unit),
             median_window=params.loss.median_window,
-            chamfer=params.loss.chamfer,
+            chamfer=params.loss.chamfer if method else "symmetric",
         )
 
     def terms(self, rollouts: Rollouts) -> dict[str, np.ndarray]:

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sling2sim2real.base.launches_file import COLUMNS, metres
+from sling2sim2real.base.launches_file import COLUMNS, FIT, LaunchRow, metres
 from sling2sim2real.identification.posterior.expansion import Linearised
 from sling2sim2real.simulator.launch import landing_gradient, launch
 from sling2sim2real.simulator.model import ClampedBand, LaunchSetup
@@ -39,6 +39,19 @@ class Observed:
         values = *self.draw, self.error, self.landing
         for name, value in zip(COLUMNS[:4], values, strict=True):
             metres("launch", name, "" if value is None else str(value))
+
+
+def observed(rows: Sequence[LaunchRow], usual: float) -> list[Observed]:
+    """Those launches of a table that are to fit.
+
+    Args:
+        usual: Standard deviation of a draw without one of its own [m].
+    """
+    return [
+        Observed(row.draw, usual if row.error is None else row.error, row.landing)
+        for row in rows
+        if row.use == FIT and row.landing is not None
+    ]
 
 
 @dataclass(frozen=True)

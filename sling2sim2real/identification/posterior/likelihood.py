@@ -24,7 +24,7 @@ from sling2sim2real.identification.posterior.alignment import recoil_seen
 from sling2sim2real.identification.posterior.coordinates import LOSS
 from sling2sim2real.identification.posterior.expansion import Expansion, Form
 from sling2sim2real.identification.posterior.residuals import Residuals, Rule
-from sling2sim2real.simulator.interaction import Rollouts, interact
+from sling2sim2real.simulator.interaction import Rollouts, interact, with_recorded_pads
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
 
@@ -86,21 +86,6 @@ class Tolerances:
         return np.array([self.release, self.camera, self.hand])
 
 
-def opening_time(episode: Episode, sling: ClampedBand, friction: float) -> float:
-    """Time in which the simulated pads must open for the force to fall as fast as recorded [s].
-
-    From the slip on friction falls with the pads' force, which is gone after the opening time: the
-    held force is gone sooner, by its share of the friction of closed pads. An episode that does
-    not say how fast its force fell has the lab's own.
-    """
-    fall = episode.metadata.get("preprocessing", {}).get("release_fall")
-    if not fall:
-        return sling.finger_opening_time
-    last = np.flatnonzero(episode.time < episode.release_time)[-20:]
-    held = np.linalg.norm(episode.force[last], axis=1).max()
-    return float(np.clip(fall * 2 * friction * sling.grip_force / held, 5e-4, 0.05))
-
-
 def _picture_count(episode: Episode) -> int:
     """How many of the first pictures hold all that count."""
     return max(Rule().pictures(episode), default=-1) + 1
@@ -125,7 +110,7 @@ class Likelihood:
     ) -> None:
         """`friction` is what the method fixes, of the pads."""
         self.episode, self.cutoff = episode, cutoff
-        self.sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
+        self.sling = with_recorded_pads(sling, episode, friction)
         self.tolerances, self.camera_shift = Tolerances.of(episode), 0.0
         end = np.searchsorted(episode.time, episode.release_time)
         place = episode.position[max(end - 5, 0) : end].mean(axis=0)

@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.files import read_table, replacing
+from sling2sim2real.base.files import column, read_table, replacing
 from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.parameters import Parameters
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from sling2sim2real.identification.objective.evaluate import Evaluation
 
 TERMS = ("geom", "force", "work")  # of the paper's loss
+UNIT = "unit_"  # before the name of an axis: its coordinate in the unit cube
 
 
 @dataclass
@@ -38,7 +39,7 @@ class Evaluations:
     def _schema(self) -> pa.Schema:
         text, number, counter = pa.string(), pa.float64(), pa.int32()
         fields = {"method": text, "phase": text, "generation": counter, "solver": counter}
-        axes = [f"unit_{name}" for name in self.names] + [*self.names]
+        axes = [UNIT + name for name in self.names] + [*self.names]
         fields |= dict.fromkeys((*axes, *TERMS, "total"), number)
         return pa.schema([*fields.items(), ("failure", text)])
 
@@ -57,7 +58,7 @@ class Evaluations:
             "phase": [phase] * count,
             "generation": [generation] * count,
             "solver": [None] * count if solver is None else solver,
-            **{f"unit_{name}": evaluation.unit[:, k] for k, name in enumerate(self.names)},
+            **{UNIT + name: evaluation.unit[:, k] for k, name in enumerate(self.names)},
             **{name: evaluation.theta[:, k] for k, name in enumerate(self.names)},
             **evaluation.terms,
             "total": evaluation.total,
@@ -73,31 +74,34 @@ class Evaluations:
     @property
     def unit(self) -> np.ndarray:
         """Shape (N, D)."""
-        return np.stack([self.table[f"unit_{name}"].to_numpy() for name in self.names], axis=1)
+        return np.stack([column(self.table, UNIT + name) for name in self.names], axis=1)
 
     @property
     def total(self) -> np.ndarray:
         """Shape (N,); +inf where failed."""
-        return self.table["total"].to_numpy()
+        return column(self.table, "total")
 
     def save(self, path: Path) -> None:
         with replacing(path) as temporary:
             pq.write_table(self.table, temporary)
 
     @classmethod
-    def load(cls, method: str, names: tuple[str, ...], *paths: Path) -> Evaluations:
+    def load(cls, method: str, *paths: Path) -> Evaluations:
         """Read files that `save` wrote, one after the other."""
-        return cls(method, names, [read_table(path) for path in paths])
+        tables = [read_table(path) for path in paths]
+        axes = (name for name in tables[0].column_names if name.startswith(UNIT))
+        return cls(method, tuple(name.removeprefix(UNIT) for name in axes), tables)
 
     def followed_by(self, other: Evaluations) -> Evaluations:
         """These rows, then those of `other`."""
         return Evaluations(self.method, self.names, [self.table, other.table])
 
     def of_phase(self, phase: str) -> Evaluations:
-        """The rows of one phase alone."""
+        """The rows of one phase alone, by slices: a table's own filter imports pandas."""
         table = self.table
-        chosen = pa.array(table["phase"].to_numpy() == phase)
-        return Evaluations(self.method, self.names, [table.filter(chosen)])
+        rows = [row for row, name in enumerate(table["phase"].to_pylist()) if name == phase]
+        parts = [table.slice(row, 1) for row in rows] or [table.slice(0, 0)]
+        return Evaluations(self.method, self.names, parts)
 
     def best_parameters(self, law: str) -> Parameters:
         """One sample, of the best row. Raises UserError as `best_row`."""

@@ -205,9 +205,15 @@ def load_theta(path: Path, band: str) -> dict:
 
 
 def save_confidence(
-    path: Path, band: str, entries: dict, samples: Parameters | None = None
+    path: Path, band: str, entries: dict, samples: Parameters | None = None, *, mounting: bool
 ) -> None:
-    """Write a `PosteriorFile`: entries of the θ file, and samples if the search has any."""
+    """Write a `PosteriorFile`: entries of the θ file, and samples if the search has any.
+
+    Args:
+        mounting: False: the search left the clamps as `setup` says.
+    """
+    if not mounting:
+        entries = entries | {"mounted": False}
     names, values = ([], []) if samples is None else ([*samples.names], samples.values.tolist())
     content = {"band": band, "names": names, "samples": values, "estimate": entries}
     write_json(path, content)

@@ -187,6 +187,7 @@ def test_what_is_no_function_is_one_line(name, words) -> None:
 
 def test_another_engine_changes_the_loss_and_gets_whole_batches(monkeypatch) -> None:
     sling, recorded = recorded_yardstick(PARAMS)
+    sling = replace(sling, law=PARAMS.methods["paper"].law)
     theirs = "tests.identification.objective.toy_engine:simulate"
     methods = PARAMS.methods
     other = methods["paper"].model_copy(update={"engine": theirs})

@@ -1,12 +1,14 @@
 """What a recording leaves open, eliminated: NumPy's least squares over all unknowns at once."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sling2sim2real.identification.posterior.expansion import Expansion, _repeated
-from sling2sim2real.identification.posterior.likelihood import Likelihood, Tolerances, opening_time
+from sling2sim2real.identification.posterior.likelihood import Likelihood, Tolerances
+from sling2sim2real.simulator.interaction import with_recorded_pads
 
 PHI, INNER, FORCES, BINS = 4, 3, 15, 12
 PICTURE = np.repeat([7, 8, 9], 4)
@@ -171,6 +173,12 @@ def test_tolerances_are_the_episodes_own_or_as_usual():
         assert Tolerances.of(SimpleNamespace(metadata=empty)) == usual
 
 
+@dataclass
+class Pads:
+    grip_force: float = 50.0
+    finger_opening_time: float = 0.004
+
+
 def held(fall: float | None, force: float = 20.0) -> SimpleNamespace:
     """A hand that holds a force until 1 s, when it falls within `fall`."""
     time = np.arange(0, 1.3, 0.03)
@@ -182,15 +190,16 @@ def held(fall: float | None, force: float = 20.0) -> SimpleNamespace:
 
 def test_pads_that_open_linearly_let_the_force_fall_as_recorded():
     """Slip begins when 2 mu N (1 - t/T) is the held force; what then falls takes until T."""
-    sling, friction = SimpleNamespace(grip_force=50.0, finger_opening_time=0.004), 0.7
-    opening, step = 0.006, 1e-7
+    opening, step, friction = 0.006, 1e-7, 0.7
     time = np.arange(0, opening, step)
-    most = 2 * friction * sling.grip_force * (1 - time / opening)
+    most = 2 * friction * Pads.grip_force * (1 - time / opening)
     fall = step * np.count_nonzero(most < 20.0)
-    assert opening_time(held(fall), sling, friction) == pytest.approx(opening, rel=1e-3)
-    assert opening_time(held(None), sling, friction) == 0.004
-    assert opening_time(held(1e-6), sling, friction) == 5e-4
-    assert opening_time(held(1.0), sling, friction) == 0.05
+
+    def set_by(fall: float | None) -> float:
+        return with_recorded_pads(Pads(), held(fall), friction).finger_opening_time
+
+    assert set_by(fall) == pytest.approx(opening, rel=1e-3)
+    assert [set_by(fall) for fall in (None, 1e-6, 1.0)] == [0.004, 5e-4, 0.05]
 
 
 def test_what_repeats_itself_counts_as_fewer_samples() -> None:

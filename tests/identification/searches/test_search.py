@@ -176,9 +176,9 @@ def test_a_history_without_rows_can_be_kept(tmp_path: Path) -> None:
     empty, full = Evaluations("toy", NAMES), alone("de", quadratic(CENTRE, np.eye(5)), 30)
     empty.save(tmp_path / "empty.parquet")
     full.save(tmp_path / "full.parquet")
-    loaded = Evaluations.load("toy", NAMES, tmp_path / "full.parquet", tmp_path / "empty.parquet")
+    loaded = Evaluations.load("toy", tmp_path / "full.parquet", tmp_path / "empty.parquet")
     assert loaded.table.equals(full.table)
-    assert len(Evaluations.load("toy", NAMES, tmp_path / "empty.parquet").total) == 0
+    assert len(Evaluations.load("toy", tmp_path / "empty.parquet").total) == 0
 
 
 def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
@@ -190,7 +190,9 @@ def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
         (paths[:1] * 2, "de", NAMES),
         (paths, "cma", NAMES[:3]),
     ):
-        evaluations = Evaluations.load("toy", names, *files)
+        evaluations = Evaluations.load("toy", *files)
+        assert evaluations.names == NAMES
+        evaluations.names = names
         content, best = theta_content(evaluations, "band1", {}), evaluations.best_row()
         assert best["total"] == content["loss"]["total"] == evaluations.total.min()
         assert content["theta"] == {name: best[name] for name in names}

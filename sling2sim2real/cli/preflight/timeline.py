@@ -49,7 +49,7 @@ def write_timeline(look: Look, params: Settings, path: Path) -> str:
         import rerun
     except ImportError:
         raise UserError(
-            "--rrd: Rerun is not installed: .venv/bin/pip install -e '.[rerun]' -c constraints.txt"
+            "--rrd: Rerun is not installed: .venv/bin/pip install -e '.[view]' -c constraints.txt"
         ) from None
     if look.recording is None:
         return f"{path} was not written: nothing in the recording can be shown"

@@ -18,7 +18,7 @@ from sling2sim2real.cli.preflight.timeline import write_timeline
 
 @pytest.fixture
 def with_rerun() -> None:
-    pytest.importorskip("rerun", reason="rerun-sdk: pip install -e '.[rerun]'")
+    pytest.importorskip("rerun", reason="rerun-sdk: pip install -e '.[view]'")
 
 
 def test_the_sheet_shows_six_moments(looked, params, tmp_path) -> None:
@@ -104,6 +104,6 @@ def test_the_timeline_is_read_by_rerun(with_rerun, looked, params, tmp_path) -> 
 
 def test_without_rerun_one_line_says_so(looked, params, tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "rerun", None)
-    with pytest.raises(UserError, match=r"pip install -e '\.\[rerun\]'"):
+    with pytest.raises(UserError, match=r"pip install -e '\.\[view\]'"):
         write_timeline(looked, params, tmp_path / "out.rrd")
     assert not list(tmp_path.iterdir())

@@ -295,5 +295,21 @@ def export(arguments: argparse.Namespace) -> Done:
     return kinds.shown(done.card, True) if arguments.json else shown(done.folder, done.card)
 
 
+@command(
+    "open a viewer: a band's first pull as recorded and as simulated, and its launches",
+    "bands/orange",
+    BAND,
+    flag("--save", type=Path, metavar="OUT.rrd", help="write a file for Rerun's viewer instead"),
+)
+def view(arguments: argparse.Namespace) -> Done:
+    from sling2sim2real.api.band_folder import BandFolder
+    from sling2sim2real.cli.preflight.output import expect_writable
+    from sling2sim2real.cli.view import view
+
+    if arguments.save:
+        expect_writable(arguments.save, ".rrd")
+    return view(BandFolder.at(arguments.band), arguments.save)
+
+
 if __name__ == "__main__":
     main()

@@ -34,8 +34,6 @@ from mcap.exceptions import EndOfFile, McapError
 from mcap.reader import make_reader
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from rosbags.interfaces import MessageDefinitionFormat
-from rosbags.rosbag1 import Reader as Ros1Reader
-from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.recording.messages import NO_SCHEMA, Spool, Topic
@@ -256,6 +254,9 @@ def _read_bag(part: Path, ros1: bool, topics: _Topics) -> None:
 
     Raises UserError where it is damaged.
     """
+    from rosbags.rosbag1 import Reader as Ros1Reader  # others do not need what these import
+    from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
+
     bag = Ros1Reader(part) if ros1 else Sqlite3Reader(part)
     try:
         bag.open()

@@ -89,6 +89,7 @@ class Topic:
     log_times: list[int] = field(default_factory=list)
     readings: dict[str, list[Reading | Unreadable]] = field(default_factory=dict)
     problem: str = ""
+    readers: dict[str, Read] = field(default_factory=dict)
     decode: Decoder | None = None
     spool: Spool | None = None
 
@@ -96,8 +97,9 @@ class Topic:
     def of(cls, name: str, schema: Schema, encoding: str, spool: Spool | None = None) -> Topic:
         """One without messages; pictures stay in memory without a spool."""
         topic = cls(name, replace(schema, name=printable(schema.name)), encoding, spool=spool)
-        topic.readings = {what: [] for what in TYPES.get(topic.kind, {})}
-        if topic.readings:
+        topic.readers = TYPES.get(topic.kind, {})
+        topic.readings = {what: [] for what in topic.readers}
+        if topic.readers:
             try:
                 topic.decode = decoder(schema, encoding)
             except Exception as error:  # the parsers raise many kinds
@@ -116,7 +118,7 @@ class Topic:
         if self.decode is None:
             return
         message = _tried(self.decode, payload)
-        for what, read in TYPES[self.kind].items():
+        for what, read in self.readers.items():
             reading = message if isinstance(message, Unreadable) else _tried(read, message)
             if self.spool and isinstance(reading, Reading) and isinstance(reading.value, Picture):
                 stored = replace(reading.value, content=self.spool.put(reading.value.data))

@@ -353,3 +353,8 @@ def test_names_with_control_characters_or_markup_are_refused_in_one_printable_li
         value = next(values, "/topic")
         for name in ("x\x1b[2J", "<script>", "../x", "a\nb", "$x$"):
             assert refusal(changed((*place, name), value)).isprintable()
+
+
+def test_all_methods_of_the_paper_have_the_law_of_its_engine() -> None:
+    laws = {name: method.law for name, method in load(DEFAULTS).methods.items()}
+    assert laws.pop("posterior") == "rubber" and {*laws.values()} == {"corotated"}

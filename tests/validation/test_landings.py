@@ -11,7 +11,6 @@ from rig.physics.launch import Trial
 from validation.campaigns import rig_scores
 from validation.campaigns.landings import (
     FIRST,
-    ONE_DIP,
     SETS,
     OneRecording,
     figures,
@@ -43,15 +42,6 @@ def test_each_band_is_recorded_by_both_pulls_and_once_after_it_was_drawn() -> No
         job.params.rig.recordings["plain"].pull == "informative"
         and job.params.bands["develop1"].preconditioned
     )
-
-
-def test_one_dip_is_recorded_on_the_bands_that_a_choice_may_rest_on() -> None:
-    every = jobs(ONE_DIP)
-    assert {job.band for job in every} == {*SETS["develop"][1], *SETS["bands"][1]}
-    plain = OneRecording(DEVELOP, "band1", "informative", False, 0).params.plan
-    (dip,) = every[0].params.plan.dips
-    assert dip.depth < min(deep.depth for deep in plain.dips) and len(plain.dips) == 3
-    assert every[0].params.rig.recordings["plain"].pull == "informative"
 
 
 def test_half_of_the_sealed_rubbers_soften_by_laws_that_none_was_developed_on() -> None:

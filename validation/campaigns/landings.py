@@ -3,15 +3,13 @@
     python -m validation.campaigns.landings develop
     python -m validation.campaigns.landings sealed     # once: validation/rubbers.py has the rules
     python -m validation.campaigns.landings bands
-    python -m validation.campaigns.landings one_dip    # the rule on dips: these two by a single one
 
 Each band is recorded by the paper's pull and by the informative one (`plan.dips`), virgin and as it
 is after an earlier pull, and identified by the default method from that one recording; nine targets
 are scored without launch noise (bias), and one launch each with it (coverage). The first recording
 of each virgin band is also identified by the paper's method, and by ours with a launch measured.
 Results are lines of results.jsonl in --work: a run that was killed, or whose --minutes were over,
-goes on from there. It writes reports/validation/landings-<set>.json. With --keep the episodes stay
-in --work: what comes after them is repeated without the recording, once results.jsonl is gone.
+goes on from there. It writes reports/validation/landings-<set>.json.
 """
 
 from __future__ import annotations
@@ -19,7 +17,6 @@ from __future__ import annotations
 import re
 import shutil
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -42,15 +39,13 @@ from validation.campaigns.rig_scores import (
     sling_of,
     summaries,
 )
-from validation.campaigns.runner import OURS, PAPER, job_of, read
+from validation.campaigns.runner import OURS, PAPER, job_of
 from validation.density import Calibrated, calibrated_by
-from validation.projects import DEFAULTS, changed
+from validation.projects import DEFAULTS
 from validation.reports import paragraph, plain, row, write_report
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
 WORK, PULLS = Path(".checkpoints/landings"), ("paper", "informative")
-ONE_DIP = "one_dip"  # instead of plan.dips, which reports/validation/pulls.json has
-DIPS = Path("reports/validation/pulls.json")
 OTHERWISE: tuple[tuple[str, dict], ...] = (  # how the first recording of a band is identified too
     ("informative", {"launched": True}),
     ("informative", {"method": PAPER}),
@@ -89,11 +84,7 @@ class OneRecording:
 
     @property
     def params(self) -> Params:
-        pull = "informative" if self.pull == ONE_DIP else self.pull
-        params = with_rubbers(load(DEFAULTS), self.seed, self.number, pull, self.worn)
-        if pull == self.pull:
-            return params
-        return changed(params, {"plan.dips": read(DIPS)["dips"][ONE_DIP]})
+        return with_rubbers(load(DEFAULTS), self.seed, self.number, self.pull, self.worn)
 
 
 SETS = {
@@ -103,33 +94,25 @@ SETS = {
 }
 
 
-def jobs(name: str, most: int = TEN, pulls: Sequence[str] = PULLS) -> list[OneRecording]:
+def jobs(name: str, most: int = TEN) -> list[OneRecording]:
     """List at most so many recordings of each band of a set by each pull, worn ones once."""
-    if name == ONE_DIP:
-        numbers, bands = range(min(RECORDINGS, most)), (*SETS["develop"][1], *BANDS)
-        return [OneRecording(DEVELOP, band, ONE_DIP, False, n) for n in numbers for band in bands]
     seed, bands, count, states = SETS[name]
     return [
         OneRecording(seed, band, pull, False, 0, **otherwise)
         for pull, otherwise in OTHERWISE
-        if pull in pulls
         for band in bands
     ] + [
         OneRecording(seed, band, pull, worn, number)
         for number in range(min(count, most))
         for worn in states
-        for pull in pulls
+        for pull in PULLS
         for band in bands
         if not (worn and number)
     ]
 
 
-def identified(job: OneRecording, work: Path, keep: bool = False) -> dict:
-    """Scores of a method by one recording, and what it says of itself.
-
-    Args:
-        keep: The episode, in a folder of the job's own; one that is there is taken as it is.
-    """
+def identified(job: OneRecording, work: Path) -> dict:
+    """Scores of a method by one recording, and what it says of itself."""
     params, begin = job.params, time.process_time()
     folder = work / fingerprint(repr(job))
     episode = recorded(params, job.band, folder)
@@ -141,8 +124,7 @@ def identified(job: OneRecording, work: Path, keep: bool = False) -> dict:
             outcome, confidence = calibrated_by(params, job.method, sling, [episode], observed)
         seconds = time.process_time() - start
         scores = scored(outcome, params, world, seed=job.number)
-    if not keep:
-        shutil.rmtree(folder)
+    shutil.rmtree(folder)
     return {
         "scores": scores,
         "confidence": {name: confidence.get(name) for name in STORED},
@@ -295,18 +277,14 @@ def report_of(name: str) -> Path:
 
 def main() -> None:
     parser = runner.parser(__doc__, None, WORK)
-    parser.add_argument("set", choices=[*SETS, ONE_DIP])
-    parser.add_argument("--pulls", nargs="+", choices=PULLS)
-    parser.add_argument("--keep", action="store_true", help="the episodes, and take those kept")
+    parser.add_argument("set", choices=SETS)
     parser.add_argument("--recordings", type=int, default=TEN, help="of each band, at most")
     args = parser.parse_args()
     if args.recordings < 1:
         raise UserError("--recordings: from 1 on")
-    if args.pulls and args.set == ONE_DIP:
-        raise UserError(f"--pulls: {ONE_DIP} is a pull of its own")
     args.work = args.work / args.set
-    todo = jobs(args.set, args.recordings, args.pulls or PULLS)
-    lines = runner.results_of(args, partial(identified, work=args.work, keep=args.keep), todo)
+    todo = jobs(args.set, args.recordings)
+    lines = runner.results_of(args, partial(identified, work=args.work), todo)
     recordings = plain([brief(line) for line in lines], 4)
     content = {
         "jobs": [len(lines), len(todo)],

@@ -13,15 +13,15 @@ from pipeline.report.tables import BULLSEYE
 from sling2sim2real.base.target import TARGET_AREA
 from sling2sim2real.drawing.canvas import mark, patch, picture
 from sling2sim2real.drawing.styles import INK, Styles
+from sling2sim2real.launching.flight import flight
 from sling2sim2real.settings.lab import SetupParams
-from sling2sim2real.simulator.model import GRAVITY
 
 LINEAR = 10  # cm, beyond which an axis is logarithmic
 TICKS = (-100, -30, -10, -5, 0, 5, 10, 30, 100)
 MARKS = ("v", "o", "^", "s", "D", "P")  # of targets, near to far
 ROOM = 0.32  # of a row, that launches take to either side
 SHADE = "0.88"
-POINTS = 40  # of a simulated flight
+LEAVES = "leave_y", "leave_z", "speed", "angle"  # columns of a predicted flight
 DOT = {"ls": "", "marker": "o", "ms": 4, "color": "0.4"}
 
 
@@ -107,7 +107,9 @@ def flights(trials: pd.DataFrame, setup: SetupParams, styles: Styles) -> Figure:
             if trial["flight_y"] is not None:
                 ax.plot(trial["flight_y"], trial["flight_z"], color=style.color, lw=0.9, alpha=0.8)
             if np.isfinite(trial["predicted_speed"]):
-                ax.plot(*expected(trial, floor), color=INK, lw=0.6, ls="--", zorder=1)
+                y, z, speed, angle = (trial[f"predicted_{name}"] for name in LEAVES)
+                way = flight(y, z, speed, angle, floor)
+                ax.plot(*way, color=INK, lw=0.6, ls="--", zorder=1)
         if (flown := mine.flight_y.notna().sum()) < len(mine):
             ax.set_title(f"{style.name} ({flown} of {len(mine)} flew)", fontsize=9)
         ax.set(aspect="equal", xlabel="y [m]")
@@ -121,12 +123,3 @@ def flights(trials: pd.DataFrame, setup: SetupParams, styles: Styles) -> Figure:
     ]
     explain(figure, entries)
     return figure
-
-
-def expected(trial: dict, floor: float) -> tuple[np.ndarray, np.ndarray]:
-    """The flight, y and z [m], of a predicted launch, without air, from the pouch to the floor."""
-    speed, angle = trial["predicted_speed"], trial["predicted_angle"]
-    vy, vz = speed * np.cos(angle), speed * np.sin(angle)
-    y, z = trial["predicted_leave_y"], trial["predicted_leave_z"]
-    time = np.linspace(0, (vz + np.sqrt(vz**2 + 2 * GRAVITY * (z - floor))) / GRAVITY, POINTS)
-    return y + vy * time, z + vz * time - GRAVITY * time**2 / 2

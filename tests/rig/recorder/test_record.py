@@ -98,7 +98,7 @@ def test_same_schemas_as_a_lab_writes(recorded: tuple[Path, Interaction], shared
 
 def test_rerun_finds_no_fault(recorded: tuple[Path, Interaction]) -> None:
     """As docs/rig.md says, it opens the file itself."""
-    pytest.importorskip("rerun", reason="rerun-sdk: pip install -e '.[rerun]'")
+    pytest.importorskip("rerun", reason="rerun-sdk: pip install -e '.[view]'")
     command = [sys.executable, "-m", "rerun", "mcap", "check", str(recorded[0])]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

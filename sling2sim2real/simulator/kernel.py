@@ -14,7 +14,7 @@ import warp as wp
 from sling2sim2real.base.native import built_once, text_of
 from sling2sim2real.simulator.model import DOFS
 from sling2sim2real.simulator.records import macros
-from sling2sim2real.simulator.rubber import COROTATED, RUBBER, memories
+from sling2sim2real.simulator.rubber import memories
 
 
 @built_once
@@ -55,18 +55,15 @@ def sling_kernel(
         first_free: int
         launching: int
 
-    laws = "material.h", "rubber.h", "corotated.h"
-    parts = ("lanes.h", "state.h", *laws, "rod.h", "solve.h", "step.h")
+    parts = ("lanes.h", "state.h", "material.h", f"{law}.h", "rod.h", "solve.h", "step.h")
     text = text_of(
         *(Path(__file__).with_name(part) for part in parts),
         arrays=Arrays,
-        SC="double" if double else "float",
-        W=lanes,
-        N=DOFS,
-        L=sections,
-        MID=middle,
-        RUBBER=int(law == RUBBER),
-        COROTATED=int(law == COROTATED),
+        scalar="double" if double else "float",
+        WIDTH=lanes,
+        DOFS=DOFS,
+        SECTIONS=sections,
+        MIDDLE=middle,
         MEMORIES=memories(law),
         **macros(),
     )

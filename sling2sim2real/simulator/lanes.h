@@ -1,64 +1,68 @@
-// How slings are laid out over threads; one text for both kinds of device.
+// How slings lie over threads: all that differs between the two kinds of device.
 //
-// On a CPU a thread steps W slings in its SIMD lanes: `real` is a vector of W numbers. On a GPU `real` is one number, and
-// the T = 32 threads of a warp share a sling: each has sections to assemble, and two chains of N + 1 threads, a column
-// of the blocks each, eliminate from both ends to the middle.
+// On a CPU a thread steps WIDTH slings in its SIMD lanes: `real` is a vector of WIDTH numbers, and one chain eliminates from
+// the first section to the last. On a GPU `real` is one number, and the TEAM = 32 threads of a warp share a sling: each
+// stages some sections, and two chains of DOFS + 1 threads, a column of the blocks each, eliminate from both ends.
 //
-// Wants the macros SC (float or double), W, L (cross-sections), MID (the held one), N (degrees of freedom of each).
+// Wants the macros scalar (float or double), WIDTH, SECTIONS, MIDDLE (the held section), DOFS (of a section).
 
 #if defined(__CUDA_ARCH__)
-typedef SC real;
-#define T 32
-#define CHAINS 2
-#define AGAIN 0                                          // whether a factor serves twice: a GPU, which waits, gains nothing
-#define COLUMNS 1                                        // columns of a block that a thread has, the residual's too
-#define OWN_ROWS 1                                       // rows of the solution that it has
-const int sling = tid / T, member = tid % T;
-const int chain = member > N, first = chain * (N + 1);   // its first thread
-const int mine = member - first;                         // my column; of spare threads more than N
-const bool down = chain;                                 // from the last section
-#define ROW(array, size) (array.data + (size_t)sling * (size))
-#define SAVE (work.data + (size_t)sling * ((LAST + 1) * SAVED) * T + member)
-#define SAVE_STRIDE T
-#define OF(array, k, m) __shfl_sync(~0u, array[0][m], first + (k))  // row m of column k
-#define AT_MEMBER(array, k) __shfl_sync(~0u, array[0], first + (k))
-#define SYNC __syncwarp()
+typedef scalar real;
+#define TEAM 32
+#define MEET MIDDLE                                       // section where the chains meet
+#define COLUMNS 1                                         // of a block, and of its residual, that a thread has
+#define REUSES_FACTORS false                              // whether Newton's method may freeze its Hessian
+const int sling = tid / TEAM, member = tid % TEAM;
+const int first_of_chain = member > DOFS ? DOFS + 1 : 0;  // a thread
+const int first_column = member - first_of_chain;         // of this thread; of spare threads more than DOFS
+const bool backwards = member > DOFS;                     // this chain begins at the last section
+#define OF_SLING(array, size) (array.data + (size_t)sling * (size))
+#define LOWER_PART_FROM(column) 0                         // a thread has its column whole
+#define ENTRY(columns, column, row) __shfl_sync(~0u, columns[0][row], first_of_chain + (column))
+#define ROW_OF_OWN(columns, row, q) columns[0][row]
+#define OF_COLUMN(values, column) __shfl_sync(~0u, values[0], first_of_chain + (column))
+#define WAIT_FOR_TEAM __syncwarp()
 #define ALL(mask) __all_sync(~0u, mask)
 #define SQRT(x) sqrt(x)
 #define UNROLL _Pragma("unroll")
-#define FIRST_ROW(c) 0                                   // a block's columns are whole; on a CPU, from the diagonal
+#define INLINED
 auto team_maximum = [](real x) -> real {
-  for (int reach = 1; reach < T; reach *= 2) {
+  for (int reach = 1; reach < TEAM; reach *= 2) {
     const real other = __shfl_xor_sync(~0u, x, reach);
     x = x > other ? x : other;
   }
   return x;
 };
+// adds what the other chain has of the same column
+auto join_chains = [&](real (&column)[1][DOFS]) {
+  const int other = member < 2 * (DOFS + 1) ? (member + DOFS + 1) % (2 * (DOFS + 1)) : member;
+  UNROLL for (int m = 0; m < DOFS; ++m) column[0][m] += __shfl_sync(~0u, column[0][m], other);
+};
 #else
-typedef SC real __attribute__((vector_size(sizeof(SC) * W)));
-#define T 1
-#define CHAINS 1
-#define AGAIN 1
-#define COLUMNS (N + 1)
-#define OWN_ROWS N
-const int sling = tid, member = 0, mine = 0;
-const bool down = false;
-#define ROW(array, size) ((real*)array.data + (size_t)sling * (size))
-#define SAVE ((real*)work.data + (size_t)sling * (L * SAVED) * COLUMNS)
-#define SAVE_STRIDE COLUMNS
-#define OF(array, k, m) array[k][m]
-#define AT_MEMBER(array, k) array[k]
-#define SYNC
-auto all_lanes = [](auto mask) -> bool { bool all = true; for (int k = 0; k < W; ++k) all &= (mask[k] != 0); return all; };
-auto root = [](real x) -> real { real y; for (int k = 0; k < W; ++k) y[k] = __builtin_sqrt(x[k]); return y; };
+typedef scalar real __attribute__((vector_size(sizeof(scalar) * WIDTH)));
+#define TEAM 1
+#define MEET (SECTIONS - 1)
+#define COLUMNS (DOFS + 1)
+#define REUSES_FACTORS true
+const int sling = tid, member = 0, first_of_chain = 0, first_column = 0;
+const bool backwards = false;
+#define OF_SLING(array, size) ((real*)array.data + (size_t)sling * (size))
+#define LOWER_PART_FROM(column) (column)
+#define ENTRY(columns, column, row) columns[column][row]
+#define ROW_OF_OWN(columns, row, q) columns[row][q]       // by symmetry
+#define OF_COLUMN(values, column) values[column]
+#define WAIT_FOR_TEAM
+auto all_lanes = [](auto mask) -> bool { bool all = true; for (int k = 0; k < WIDTH; ++k) all &= (mask[k] != 0); return all; };
+auto root = [](real x) -> real { real y; for (int k = 0; k < WIDTH; ++k) y[k] = __builtin_sqrt(x[k]); return y; };
 #define ALL(mask) all_lanes(mask)
 #define SQRT(x) root(x)
 #define UNROLL _Pragma("clang loop unroll(full)")
-#define FIRST_ROW(c) (c)
+#define INLINED __attribute__((always_inline))            // else what the lambda captures lies in memory
 auto team_maximum = [](real x) -> real { return x; };
+auto join_chains = [](real (&)[COLUMNS][DOFS]) {};
 #endif
 
-const real zero = real() * (SC)0, one = zero + (SC)1;
+const real zero = real() * (scalar)0, one = zero + (scalar)1;
 auto maximum = [](real x, real y) -> real { return x > y ? x : y; };
 auto minimum = [](real x, real y) -> real { return x < y ? x : y; };
 auto magnitude = [&](real x) -> real { return x < zero ? -x : x; };

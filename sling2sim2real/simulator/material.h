@@ -36,15 +36,15 @@ auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&
     square = maximum(square, dot(xp[k], xp[k]) + shear);
   }
   const real J = dot(x[0], C[0]), Jp = dot(xp[0], Cp[0]);
-  const real p = lam * (J - (SC)1) - mu;
+  const real p = lam * (J - (scalar)1) - mu;
   // far from rest Newton's method takes a smaller part of what may be negative
-  const real pc = minimum(maximum(p, (SC)LEAST * mu), (SC)MOST * mu);
+  const real pc = minimum(maximum(p, (scalar)LEAST * mu), (scalar)MOST * mu);
   inexact = pc == p ? inexact : one;
-  const real bound = mu / SQRT(maximum(square, zero + (SC)1e-6));
+  const real bound = mu / SQRT(maximum(square, zero + (scalar)1e-6));
   const real kept = minimum(maximum(Jp, zero), one);
-  const real pv = minimum(maximum(lam * (Jp - (SC)1) - mu, (SC)-0.5 * bound * (one + kept * kept)), (SC)0.7 * bound);
+  const real pv = minimum(maximum(lam * (Jp - (scalar)1) - mu, (scalar)-0.5 * bound * (one + kept * kept)), (scalar)0.7 * bound);
   const real Jt = dot(Cp[0], xt[0]) + dot(Cp[1], xt[1]) + dot(Cp[2], xt[2]);
-  const real sv = s * shaped, dshv = dsh * shaped, volumetric = bulk + sv * mu / (SC)3;
+  const real sv = shape_damping * shaped, damp_here = damp_shape * shaped, volumetric = bulk + sv * mu / (scalar)3;
   real S[3][3], A[6], spin[3] = {zero, zero, zero};  // A: 00, 10, 11, 20, 21, 22 of the inverse below
   UNROLL for (int k = 0; k < 3; ++k) {
     real turn[3];
@@ -57,14 +57,14 @@ auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&
     UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n <= m; ++n) {
       real sum = zero;
       UNROLL for (int k = 0; k < 3; ++k) sum += xp[k][m] * S[k][n] + xp[k][n] * S[k][m];
-      tau[m * (m + 1) / 2 + n] = (SC)-0.5 * sum;
+      tau[m * (m + 1) / 2 + n] = (scalar)-0.5 * sum;
     }
-    const real trace = (SC)TURNS * mu - tau[0] - tau[2] - tau[5];
+    const real trace = (scalar)TURNS * mu - tau[0] - tau[2] - tau[5];
     tau[0] += trace; tau[2] += trace; tau[5] += trace;
     A[0] = tau[2] * tau[5] - tau[4] * tau[4]; A[1] = tau[4] * tau[3] - tau[1] * tau[5]; A[2] = tau[0] * tau[5] - tau[3] * tau[3];
     A[3] = tau[1] * tau[4] - tau[3] * tau[2]; A[4] = tau[3] * tau[1] - tau[0] * tau[4]; A[5] = tau[0] * tau[2] - tau[1] * tau[1];
-    const real slack = minimum(maximum((zero + (SC)TAUT - SQRT(dot(xp[0], xp[0]))) / (SC)(TAUT - 1), zero), one);
-    const real holds = Jp > zero ? slack * minimum(one, (SC)HOLDS / (d * s)) : one;
+    const real slack = minimum(maximum((zero + (scalar)TAUT - SQRT(dot(xp[0], xp[0]))) / (scalar)(TAUT - 1), zero), one);
+    const real holds = Jp > zero ? slack * minimum(one, (scalar)HOLDS / (damping * shape_damping)) : one;
     const real over = (one - maximum(turning, holds)) / (tau[0] * A[0] + tau[1] * A[1] + tau[3] * A[3]);
     UNROLL for (int m = 0; m < 6; ++m) A[m] *= over;
     const real b[3] = {spin[0], spin[1], spin[2]};
@@ -78,7 +78,7 @@ auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&
     cross(xt[k1], xp[k2], u); cross(xp[k1], xt[k2], v); cross(spin, S[k], turned);
     UNROLL for (int c = 0; c < 3; ++c)
       stress[k][c] = mu * x[k][c] + p * C[k][c]
-                   + d * (volumetric * Jt * Cp[k][c] + sv * (mu * xt[k][c] + pv * (u[c] + v[c]) - turned[c]));
+                   + damping * (volumetric * Jt * Cp[k][c] + sv * (mu * xt[k][c] + pv * (u[c] + v[c]) - turned[c]));
   }
   if (!fresh) return;
   UNROLL for (int l = 0; l < 3; ++l) {
@@ -86,7 +86,7 @@ auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&
     const real* a = S[l];
     UNROLL for (int m = 0; m < 3; ++m) {
       const real r0 = A[m ? (m == 1 ? 1 : 3) : 0], r1 = A[m ? (m == 1 ? 2 : 4) : 1], r2 = A[m ? (m == 1 ? 4 : 5) : 3];
-      turns[0][m] = dshv * (r1 * a[2] - r2 * a[1]); turns[1][m] = dshv * (r2 * a[0] - r0 * a[2]); turns[2][m] = dshv * (r0 * a[1] - r1 * a[0]);
+      turns[0][m] = damp_here * (r1 * a[2] - r2 * a[1]); turns[1][m] = damp_here * (r2 * a[0] - r0 * a[2]); turns[2][m] = damp_here * (r0 * a[1] - r1 * a[0]);
     }
     UNROLL for (int k = l; k < 3; ++k) UNROLL for (int n = 0; n < 3; ++n) {
       real turned[3];
@@ -97,14 +97,14 @@ auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&
   UNROLL for (int k = 0; k < 3; ++k) UNROLL for (int l = 0; l <= k; ++l) {
     real (&block)[3][3] = K[k * (k + 1) / 2 + l];
     UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n < 3; ++n)
-      block[m][n] += lam * C[k][m] * C[l][n] + dh * volumetric * Cp[k][m] * Cp[l][n];
+      block[m][n] += lam * C[k][m] * C[l][n] + damp * volumetric * Cp[k][m] * Cp[l][n];
     if (k == l) {
-      UNROLL for (int m = 0; m < 3; ++m) block[m][m] += mu + dshv * mu;
+      UNROLL for (int m = 0; m < 3; ++m) block[m][m] += mu + damp_here * mu;
     } else {
       const int o = 3 - k - l;                                  // the third column
       const real sign = (l + 1) % 3 == k ? one : -one;          // by the order of the columns
       real z[3];
-      UNROLL for (int c = 0; c < 3; ++c) z[c] = sign * (pc * x[o][c] + dshv * pv * xp[o][c]);
+      UNROLL for (int c = 0; c < 3; ++c) z[c] = sign * (pc * x[o][c] + damp_here * pv * xp[o][c]);
       block[0][1] -= z[2]; block[0][2] += z[1]; block[1][0] += z[2]; block[1][2] -= z[0]; block[2][0] -= z[1]; block[2][1] += z[0];
     }
   }

@@ -32,12 +32,11 @@
 //
 // Memory is one number an edge and branch. It knows the stretch alone: a rigid turn changes nothing.
 
-#if RUBBER
 const int BRANCHES = STEP_FOLLOW - STEP_FORGET;
-const real mooney = LAW[MATERIAL_MOONEY], upturn = LAW[MATERIAL_UPTURN], softening = LAW[MATERIAL_SOFTENING], weight = LAW[MATERIAL_RELAXATION];
-const real flow = LAW[MATERIAL_FLOW], flow_rate = LAW[MATERIAL_FLOW_RATE];
+const real mooney = law[MATERIAL_MOONEY], upturn = law[MATERIAL_UPTURN], softening = law[MATERIAL_SOFTENING], weight = law[MATERIAL_RELAXATION];
+const real flow = law[MATERIAL_FLOW], flow_rate = law[MATERIAL_FLOW_RATE];
 real following = zero;  // what a step adds of p's change: w times the sum of `follow`, and flow
-#define MEMORY(k, i) STATE[(9 * N + (k)) * L + (i)]  // overstress of the branches, then:
+#define MEMORY(k, i) stored[(9 * DOFS + (k)) * SECTIONS + (i)]  // overstress of the branches, then:
 #define STRESS_BEFORE BRANCHES
 #define CARRIED (BRANCHES + 1)                       // what a step adds whatever its end is
 #define WORST (BRANCHES + 2)                         // largest work, over mu
@@ -46,30 +45,30 @@ real following = zero;  // what a step adds of p's change: w times the sum of `f
 
 // p and `extra` at a stretch, with their slopes by it, and the work of p over mu, 0 in compression
 auto uniaxial = [&](real l, real &p, real &slope, real &extra, real &extra_slope, real &work) {
-  const real at = maximum(l, zero + (SC)0.7), i = one / at, i3 = i * i * i, beyond = l - at;
-  const real neo = at - i * i, neo_slope = one + (SC)2 * i3, first = at * at + (SC)2 * i - (SC)3;
-  extra_slope = mu * (mooney * ((SC)3 * i3 * i - neo_slope) + upturn * (first * neo_slope + (SC)2 * neo * neo));
+  const real at = maximum(l, zero + (scalar)0.7), i = one / at, i3 = i * i * i, beyond = l - at;
+  const real neo = at - i * i, neo_slope = one + (scalar)2 * i3, first = at * at + (scalar)2 * i - (scalar)3;
+  extra_slope = mu * (mooney * ((scalar)3 * i3 * i - neo_slope) + upturn * (first * neo_slope + (scalar)2 * neo * neo));
   extra = mu * (mooney * (i - one) + upturn * first) * neo + extra_slope * beyond;
   slope = mu * neo_slope + extra_slope;
   p = mu * (neo + neo_slope * beyond) + extra;
-  const real second = (SC)2 * at + i * i - (SC)3;  // I2 - 3
-  work = at > one ? (SC)0.5 * (first + mooney * (second - first)) + (SC)0.25 * upturn * first * first : zero;
+  const real second = (scalar)2 * at + i * i - (scalar)3;  // I2 - 3
+  work = at > one ? (scalar)0.5 * (first + mooney * (second - first)) + (scalar)0.25 * upturn * first * first : zero;
 };
 // how much steeper p is than the neo-Hookean: damping follows the rate of the stress
 auto steeper = [&](const real* predicted) -> real {
-  const real at = maximum(SQRT(dot(predicted, predicted)), zero + (SC)0.7), i = one / at, i3 = i * i * i;
-  const real neo = at - i * i, per = one / (one + (SC)2 * i3), first = at * at + (SC)2 * i - (SC)3;
-  return one + mooney * ((SC)3 * i3 * i * per - one) + upturn * (first + (SC)2 * neo * neo * per);
+  const real at = maximum(SQRT(dot(predicted, predicted)), zero + (scalar)0.7), i = one / at, i3 = i * i * i;
+  const real neo = at - i * i, per = one / (one + (scalar)2 * i3), first = at * at + (scalar)2 * i - (scalar)3;
+  return one + mooney * ((scalar)3 * i3 * i * per - one) + upturn * (first + (scalar)2 * neo * neo * per);
 };
 // to the stress of a stretch g and its derivative
 auto add_law = [&](int i, const real (&g)[3], real (&stress)[3], real (&K)[3][3]) {
-  const real l = SQRT(dot(g, g) + (SC)1e-12);
+  const real l = SQRT(dot(g, g) + (scalar)1e-12);
   real p, slope, extra, extra_slope, work;
   uniaxial(l, p, slope, extra, extra_slope, work);
-  const real worst = MEMORY(WORST, i), gap = maximum(worst - work, zero), join = (SC)JOIN * worst * worst;
-  const real per = one / maximum(gap * (gap + worst) + join, zero + (SC)1e-30), tension = work > zero ? one : zero;
-  const real soft = (SC)(2 + JOIN) * softening * tension * gap * per, lost = soft * gap;
-  const real regained = soft * (gap * worst + (SC)2 * join) * per / mu;  // of eta, by work
+  const real worst = MEMORY(WORST, i), gap = maximum(worst - work, zero), join = (scalar)JOIN * worst * worst;
+  const real per = one / maximum(gap * (gap + worst) + join, zero + (scalar)1e-30), tension = work > zero ? one : zero;
+  const real soft = (scalar)(2 + JOIN) * softening * tension * gap * per, lost = soft * gap;
+  const real regained = soft * (gap * worst + (scalar)2 * join) * per / mu;  // of eta, by work
   const real pull = extra + MEMORY(CARRIED, i) + (following - lost) * p, across = pull / l;
   const real along = (extra_slope + (following - lost) * slope + regained * p * p - across) / (l * l);
   UNROLL for (int m = 0; m < 3; ++m) {
@@ -78,17 +77,17 @@ auto add_law = [&](int i, const real (&g)[3], real (&stress)[3], real (&K)[3][3]
   }
 };
 // what is left of the flowing branch's overstress o after h
-auto unflowed = [&](SC h, real o) -> real {
-  const real strain = o / (mu * (SC)3), square = strain * strain;
+auto unflowed = [&](scalar h, real o) -> real {
+  const real strain = o / (mu * (scalar)3), square = strain * strain;
   return o / (one + (zero + h) * flow_rate * square * SQRT(square));
 };
 // of a step; one that relaxes begins with branches that have forgotten part of whatever stress there will be
-auto follow_of = [&](const SC* row, bool relax, int k) -> real { return relax ? LANE[LANE_UNRELAXED + k] : zero + row[STEP_FOLLOW + k]; };
-auto recall = [&](const SC* row, bool relax) {
+auto follow_of = [&](const scalar* row, bool relax, int k) -> real { return relax ? lane[LANE_UNRELAXED + k] : zero + row[STEP_FOLLOW + k]; };
+auto recall = [&](const scalar* row, bool relax) {
   real follow = zero;
   UNROLL for (int k = 0; k < BRANCHES; ++k) follow += follow_of(row, relax, k);
-  following = weight * follow + flow * (relax ? LANE[LANE_UNFLOWED] : one);
-  for (int i = member; i < L - 1; i += T) {
+  following = weight * follow + flow * (relax ? lane[LANE_UNFLOWED] : one);
+  for (int i = member; i < SECTIONS - 1; i += TEAM) {
     real carried = relax ? zero : -follow * MEMORY(STRESS_BEFORE, i);
     if (!relax) UNROLL for (int k = 0; k < BRANCHES; ++k) carried += row[STEP_FORGET + k] * MEMORY(k, i);
     carried *= weight;
@@ -98,30 +97,29 @@ auto recall = [&](const SC* row, bool relax) {
 };
 auto stress_at = [&](int i, real &work) -> real {
   real square = zero, p, slope, extra, extra_slope;
-  UNROLL for (int c = 0; c < 3; ++c) { const real gap = X(c, i + 1) - X(c, i); square += gap * gap; }
+  UNROLL for (int c = 0; c < 3; ++c) { const real gap = NOW(c, i + 1) - NOW(c, i); square += gap * gap; }
   uniaxial(SQRT(square) / edge[i], p, slope, extra, extra_slope, work);
   return p;
 };
-auto start_relaxed = [&]() {
-  for (int i = member; i < L - 1; i += T) {
+auto begin_memory = [&]() {
+  for (int i = member; i < SECTIONS - 1; i += TEAM) {
     real work;
     UNROLL for (int k = 0; k < BRANCHES; ++k) MEMORY(k, i) = zero;
     MEMORY(FLOWING, i) = zero;
     MEMORY(STRESS_BEFORE, i) = stress_at(i, work);
-    MEMORY(WORST, i) = LANE[LANE_WORST];
+    MEMORY(WORST, i) = lane[LANE_WORST];
   }
 };
-auto remember = [&](const SC* row, bool relax) {
-  for (int i = member; i < L - 1; i += T) {
+auto remember = [&](const scalar* row, bool relax) {
+  for (int i = member; i < SECTIONS - 1; i += TEAM) {
     real work;
     const real p = stress_at(i, work), change = relax ? p : p - MEMORY(STRESS_BEFORE, i);
-    MEMORY(WORST, i) = maximum(relax ? zero + LANE[LANE_WORST] : MEMORY(WORST, i), work);  // a guess stretches nothing
+    MEMORY(WORST, i) = maximum(relax ? zero + lane[LANE_WORST] : MEMORY(WORST, i), work);  // a guess stretches nothing
     UNROLL for (int k = 0; k < BRANCHES; ++k) {
       const real before = relax ? zero : row[STEP_FORGET + k] * MEMORY(k, i);
       MEMORY(k, i) = before + follow_of(row, relax, k) * change;
     }
-    MEMORY(FLOWING, i) = relax ? LANE[LANE_UNFLOWED] * change : unflowed(row[STEP_H], MEMORY(FLOWING, i)) + change;
+    MEMORY(FLOWING, i) = relax ? lane[LANE_UNFLOWED] * change : unflowed(row[STEP_H], MEMORY(FLOWING, i)) + change;
     MEMORY(STRESS_BEFORE, i) = p;
   }
 };
-#endif

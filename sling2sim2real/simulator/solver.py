@@ -17,6 +17,7 @@ from sling2sim2real.simulator.schedule import Schedule
 
 LANES = 16  # slings in a CPU thread's SIMD lanes
 WARP = 32  # GPU threads that share a sling
+STAGED = 84  # numbers that are staged of a section, as in state.h
 STEP_LIMIT = 0.004  # m, of Newton's method
 
 
@@ -165,9 +166,9 @@ def _widths(
     sling: ClampedBand, schedule: Schedule, frames: Frames, options: Options
 ) -> dict[str, int]:
     """Numbers that each array which a kernel writes holds of one sling."""
-    stored = (2 * DOFS + 2) * sling.sections * (DOFS + 1)
-    if options.on_gpu:  # by two chains, and for spare threads
-        stored = (2 * DOFS + 1) * (sling.middle + 1) * WARP
+    stored = ((2 * DOFS + 2) * (DOFS + 1) + STAGED) * sling.sections
+    if options.on_gpu:  # by two chains, and for spare threads; sections are staged in shared memory
+        stored = (2 * DOFS + 2) * (sling.middle + 1) * WARP
     return {
         "state": DOFS * sling.sections,
         "lanes": width(LANE),

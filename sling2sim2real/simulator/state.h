@@ -1,72 +1,88 @@
-// What a sling is made of, where its state is kept, and what holds during a step.
+// What a sling is made of, where its numbers are stored, and what holds during a step.
 
-const int ROW_LENGTH = (N + 3) / 4 * 4;
-const int LAST = CHAINS == 2 ? MID : L - 1;  // where a chain ends; SECTION(at) is the section that it comes to as number `at`
-#define SECTION(at) (down ? L - 1 - (at) : (at))
-const int SAVED = 2 * N + 1 + AGAIN;  // numbers kept of a column: multipliers, coupling, solution, 1 / pivot
-#define SET(name) setting.data[SETTING_##name]
-const SC mean_edge = SET(MEAN_EDGE), area = SET(AREA), radius2 = SET(RADIUS2);
-const SC wind = SET(WIND), line_mass = SET(LINE_MASS), gravity = SET(GRAVITY), node_mass = line_mass * mean_edge;
-const SC per_edge = (SC)1 / mean_edge;
-const SC* edge = mesh.data;  // rest length of each edge
-const SC tolerance = SET(TOLERANCE), step_limit = SET(STEP_LIMIT), shortest = SET(SHORTEST);
-const int max_iterations = (int)SET(MAX_ITERATIONS);
-const bool first_clamped = SET(CLAMPED) > 0, last_clamped = setting.data[SETTING_CLAMPED + 1] > 0;
+#define SETTING_OF(name) setting.data[SETTING_##name]
+const scalar mean_edge = SETTING_OF(MEAN_EDGE), area = SETTING_OF(AREA), radius2 = SETTING_OF(RADIUS2);
+const scalar wind = SETTING_OF(WIND), line_mass = SETTING_OF(LINE_MASS), gravity = SETTING_OF(GRAVITY);
+const scalar node_mass = line_mass * mean_edge, per_edge = (scalar)1 / mean_edge;
+const scalar* edge = mesh.data;  // rest length of each edge
+const scalar tolerance = SETTING_OF(TOLERANCE), step_limit = SETTING_OF(STEP_LIMIT), shortest = SETTING_OF(SHORTEST);
+const int max_iterations = (int)SETTING_OF(MAX_ITERATIONS);
+const bool first_clamped = SETTING_OF(CLAMPED) > 0, last_clamped = setting.data[SETTING_CLAMPED + 1] > 0;
+const scalar node_shift = node_mass * (scalar)2.5e5;  // the inertia of a 2 ms step
 
-const SC node_shift = node_mass * (SC)2.5e5;  // the inertia of a 2 ms step
-auto LAW = ROW(coefficients, MATERIAL_SIZE);  // of the material
-const real mu = LAW[MATERIAL_MU], lam = LAW[MATERIAL_LAM], bulk = lam - mu / (SC)3, d = LAW[MATERIAL_DAMPING], s = LAW[MATERIAL_SCALE];
-const real friction = LAW[MATERIAL_FRICTION], bending = LAW[MATERIAL_BENDING], drag = LAW[MATERIAL_DRAG], turning = LAW[MATERIAL_TURNING];
+auto law = OF_SLING(coefficients, MATERIAL_SIZE);  // of the material
+const real mu = law[MATERIAL_MU], lam = law[MATERIAL_LAM], bulk = lam - mu / (scalar)3;
+const real damping = law[MATERIAL_DAMPING], shape_damping = law[MATERIAL_SCALE];
+const real friction = law[MATERIAL_FRICTION], bending = law[MATERIAL_BENDING];
+const real drag = law[MATERIAL_DRAG], turning = law[MATERIAL_TURNING];
 
-// degree of freedom k of cross-section i: now, predicted, the y and xh of step.h, Newton's change, and of the two steps before
-auto INITIAL = ROW(state, N * L);
-auto STATE = ROW(scratch, (9 * N + MEMORIES + 4) * L);
-#define FIELD(f, k, i) STATE[((f) * N + (k)) * L + (i)]
-#define X(k, i) FIELD(0, k, i)
-#define XP(k, i) FIELD(1, k, i)
-#define Y(k, i) FIELD(2, k, i)
-#define XH(k, i) FIELD(3, k, i)
-#define DX(k, i) FIELD(4, k, i)
-#define X1(k, i) FIELD(5, k, i)
-#define X2(k, i) FIELD(6, k, i)
-#define V1(k, i) FIELD(7, k, i)
-#define V2(k, i) FIELD(8, k, i)
-auto OUT = ROW(output, OUTPUT_SIZE * steps);
-auto FRAME = ROW(frames, frame_width * L * n_frames);
-auto SAVE_ROWS = SAVE;
-#define KEEP(i, row, q) SAVE_ROWS[((i) * SAVED + (row)) * SAVE_STRIDE + (q)]
+// degree of freedom k of section i: in this iterate, predicted, y and xh of step.h, Newton's change of it; then its values
+// and rates at the ends of the last step and of the one before
+auto initial = OF_SLING(state, DOFS * SECTIONS);
+auto stored = OF_SLING(scratch, (9 * DOFS + MEMORIES + 4) * SECTIONS);
+#define FIELD(f, k, i) stored[((f) * DOFS + (k)) * SECTIONS + (i)]
+#define NOW(k, i) FIELD(0, k, i)
+#define PREDICTED(k, i) FIELD(1, k, i)
+#define FROM(k, i) FIELD(2, k, i)
+#define INERTIAL(k, i) FIELD(3, k, i)
+#define CHANGE(k, i) FIELD(4, k, i)
+#define LAST(k, i) FIELD(5, k, i)
+#define LAST_BUT_ONE(k, i) FIELD(6, k, i)
+#define LAST_RATE(k, i) FIELD(7, k, i)
+#define RATE_BEFORE(k, i) FIELD(8, k, i)
 
+// what is staged of a section (rod.h): its own block (lower triangle), stretch between nodes, gradient of the twist on both
+// sides of the joint, coefficients of bending and twist, residual of this section and of the next
+enum { OWN = 0, STRETCH = 45, TWIST = 51, TWIST_NEXT = 57, BEND = 63, TWISTING = 64, FORCE = 65, FORCE_NEXT = 74, NOTHING = 83, STAGED_SIZE = 84 };
+// what the elimination stores of a column: multipliers, coupling, solution, 1 / pivot
+enum { STORED_COUPLING = DOFS, STORED_SOLUTION = 2 * DOFS, STORED_INVERSE, STORED_SIZE };
 #if defined(__CUDA_ARCH__)
-__shared__ __align__(16) SC rows[2 * CHAINS * (N + 1) * ROW_LENGTH];  // a section's columns, for the whole chain; two sections in turn
-#define SHARED(c, k) rows[(((at & 1) * CHAINS + chain) * (N + 1) + (c)) * ROW_LENGTH + (k)]
-#define SHARE(U) if (mine <= N) { UNROLL for (int k = 0; k < N; ++k) SHARED(mine, k) = U[0][k]; } SYNC
+const int COLUMN_LENGTH = (DOFS + 3) / 4 * 4;
+__shared__ scalar staged[STAGED_SIZE * (SECTIONS | 1)];
+// a section's columns of U for the whole chain; two sections in turn
+__shared__ __align__(16) scalar shared_columns[4 * (DOFS + 1) * COLUMN_LENGTH];
+auto factors = work.data + (size_t)sling * (MIDDLE + 1) * STORED_SIZE * TEAM + first_of_chain;
+#define STAGED(v, i) staged[(v) * (SECTIONS | 1) + (i)]
+#define STORED(at, row, column) factors[((at) * STORED_SIZE + (row)) * TEAM + (column)]
+#define SHARED_COLUMN(columns, at, column, row) \
+  shared_columns[(((at & 1) * 2 + backwards) * (DOFS + 1) + (column)) * COLUMN_LENGTH + (row)]
+#define SHARE_COLUMNS(columns, at) \
+  if (first_column <= DOFS) { UNROLL for (int k = 0; k < DOFS; ++k) SHARED_COLUMN(columns, at, first_column, k) = columns[0][k]; } \
+  WAIT_FOR_TEAM
 // the back substitution reads a section ahead, so that it need not wait for the memory
-#define BEGIN_KEPT SC now[SAVED], ahead[SAVED]; UNROLL for (int r = 1; r < SAVED; ++r) ahead[r] = KEEP(LAST, r, 0)
-#define NEXT_KEPT(i) UNROLL for (int r = 1; r < SAVED; ++r) { now[r] = ahead[r]; ahead[r] = KEEP(i ? i - 1 : 0, r, 0); }
-#define KEPT(i, row, q) now[row]
+const int read_column = first_column < DOFS ? first_column : 0;
+#define BEGIN_READING_AHEAD(at) \
+  scalar now[STORED_SIZE], ahead[STORED_SIZE]; \
+  UNROLL for (int r = 1; r < STORED_SIZE; ++r) ahead[r] = STORED(at, r, read_column)
+#define READ_AHEAD(at) \
+  UNROLL for (int r = 1; r < STORED_SIZE; ++r) { now[r] = ahead[r]; ahead[r] = STORED(at ? at - 1 : 0, r, read_column); }
+#define READ(at, row, column) now[row]
 #else
-#define BEGIN_KEPT
-#define NEXT_KEPT(i)
-#define KEPT(i, row, q) KEEP(i, row, q)
-#define SHARED(c, k) U[c][k]
-#define SHARE(U)
+#define BEGIN_READING_AHEAD(at)
+#define READ_AHEAD(at)
+#define READ(at, row, column) STORED(at, row, column)
+auto staged = OF_SLING(work, SECTIONS * (STORED_SIZE * COLUMNS + STAGED_SIZE));
+auto factors = staged + SECTIONS * STAGED_SIZE;
+#define STAGED(v, i) staged[(i) * STAGED_SIZE + (v)]
+#define STORED(at, row, column) factors[((at) * STORED_SIZE + (row)) * COLUMNS + (column)]
+#define SHARED_COLUMN(columns, at, column, row) columns[column][row]
+#define SHARE_COLUMNS(columns, at)
 #endif
+#define STAGED_FORCE(m, i) STAGED(FORCE + (m), i)
+#define STAGED_FORCE_NEXT(m, i) STAGED(FORCE_NEXT + (m), i)
 
-auto LANE = ROW(lanes, LANE_SIZE);
-real direction[3], separation[5], payload = LANE[LANE_PAYLOAD], outcome = zero;
-UNROLL for (int c = 0; c < 3; ++c) direction[c] = LANE[LANE_DIRECTION + c];
+auto lane = OF_SLING(lanes, LANE_SIZE);
+real direction[3], separation[5], payload = lane[LANE_PAYLOAD], outcome = zero;
+UNROLL for (int c = 0; c < 3; ++c) direction[c] = lane[LANE_DIRECTION + c];
 UNROLL for (int c = 0; c < 5; ++c) separation[c] = zero;
 
 // of the step under way
-SC ibh = 0, ibh2 = 0, ct = 0;              // 1 / (beta h), its square; torsion
-bool attached = false, gripped = false;    // the hand leads the middle section's places; its pads hold the direction as well
-bool opening = false;                      // its fingers open
-real capacity = zero;                      // what the pads can hold [N]
-real cb = zero, dh = zero, dsh = zero;     // bending, d / (beta h), that times s
-real air = zero;                           // drag / (beta h)
-#if AGAIN
-bool fresh = true;                         // the Hessian is wanted, not the residual alone
-#else
-const bool fresh = true;
-#endif
-real shift = zero, inexact = zero;         // of the Hessian: what is added to its diagonal, whether it is not exact
+scalar per_step = 0, per_step2 = 0;                  // 1 / (beta h), its square
+bool attached = false, gripped = false;              // the hand leads the middle node; its pads hold the direction as well
+bool opening = false;                                // its fingers open
+real capacity = zero;                                // what the pads can hold [N]
+real bend_share = zero, damp = zero, damp_shape = zero;  // bending, damping / (beta h), that times shape_damping
+scalar torsion = 0;
+real air = zero;                                     // drag / (beta h)
+bool fresh = true;                                   // the Hessian is wanted, not the residual alone
+real shift = zero, inexact = zero;                   // of the Hessian: what is added to its diagonal; whether it is not exact

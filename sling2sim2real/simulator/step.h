@@ -1,4 +1,4 @@
-// Steps slings through a schedule. A step solves, for all sections at once,
+// Steps slings through a schedule. A step solves, for the unknowns x of all sections at once,
 //
 //   M (x - xh)/(beta h)^2 + c M x' + dW/dx + dD/dx' = 0,   x' = (x - y)/(beta h),
 //   y = x_n + past (x_n - x_n-1),   xh = y + beta h (v_n + past (v_n - v_n-1)) + (beta h)^2 gravity
@@ -7,34 +7,18 @@
 // (backward Euler: beta = 1, past = 0; variable-step BDF2 otherwise) by Newton's method with the exact Hessian;
 // where that is indefinite, its diagonal is shifted.
 
-const SC close = sqrt(0.25 * tolerance * shortest);  // from here on Newton's next change is below the tolerance
+const scalar close = sqrt(0.25 * tolerance * shortest);  // from here on Newton's next change is below the tolerance
 // a residual that counts for nothing [N]: by default 3 % of a node's weight, and what a strain of 1e-5 takes
-const real balance = tolerance * ((SC)1.5e4 * node_mass * gravity + (SC)5 * mu * area);
+const real balance = tolerance * ((scalar)1.5e4 * node_mass * gravity + (scalar)5 * mu * area);
 real offset[3] = {zero, zero, zero}, pull = zero, held[3] = {zero, zero, zero};  // of the hand; the force on it when it last held
-real contact_before = zero, lowest = zero + (SC)1e30;  // of the pouch, and its least height
+real contact_before = zero, lowest = zero + (scalar)1e30;                        // of the pouch, and its least height
 real given[3] = {zero, zero, zero}, owed[3] = {zero, zero, zero}, relaxed = one;  // an arm that gives way
+real force[3];                                                                   // of the band on the hand
 int iterations = 0;
 
-for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
-  const real x = INITIAL[k * L + i];
-  X1(k, i) = x; X2(k, i) = x; V1(k, i) = zero; V2(k, i) = zero; X(k, i) = x;
-}
-SYNC;
-#if RUBBER
-start_relaxed();
-SYNC;
-#endif
-for (int step = 0; step < steps; ++step) {
-  const SC* row = schedule.data + (size_t)step * STEP_SIZE;
-  const SC h = row[STEP_H], past = row[STEP_PAST], bh = row[STEP_BETA] * h;
-  const bool relax = row[STEP_MODE] == MODE_RELAX;
+// The hand takes hold of the band where it is, and leads it to its own path, to `target`
+auto lead_hand = [&](const scalar* row, real (&target)[3]) {
   const int grip = (int)row[STEP_GRIP];
-  const SC grip_force = row[STEP_GRIP_FORCE], blend = row[STEP_BLEND], time = row[STEP_TIME];
-  ibh = (SC)1 / bh; ibh2 = ibh * ibh;
-  cb = bending * row[STEP_BENDING]; ct = radius2 / 4 * row[STEP_BENDING];  // guesses relax with less of them first
-  dh = d * ibh; dsh = dh * s; air = relax ? zero : drag * ibh;
-
-  // ---- the hand takes hold of the band where it is, and leads it to its own path
   const bool was_attached = attached;
   gripped = grip == GRIP_HELD; attached = gripped || grip == GRIP_POUCH; opening = grip == GRIP_OPENING;
   // an arm that gives way rests where its spring holds the force: a fixed point, by Aitken's relaxation
@@ -44,149 +28,178 @@ for (int step = 0; step < steps; ++step) {
       const real owes = row[STEP_COMPLIANCE] * held[c] - given[c], change = owes - owed[c];
       turn -= owed[c] * change; size += change * change; owed[c] = owes;
     }
-    relaxed = minimum(maximum(relaxed * turn / maximum(size, zero + (SC)1e-16), zero + (SC)0.05), one);
+    relaxed = minimum(maximum(relaxed * turn / maximum(size, zero + (scalar)1e-16), zero + (scalar)0.05), one);
     UNROLL for (int c = 0; c < 3; ++c) given[c] += relaxed * owed[c];
   }
-  real target[3];
   UNROLL for (int c = 0; c < 3; ++c) {
-    const SC place = row[STEP_TARGET + c];
-    if (attached && !was_attached) offset[c] = X1(c, MID) - place;
-    target[c] = given[c] + place + blend * offset[c];
+    const scalar place = row[STEP_TARGET + c];
+    if (attached && !was_attached) offset[c] = LAST(c, MIDDLE) - place;
+    target[c] = given[c] + place + row[STEP_BLEND] * offset[c];
   }
   // what the pads can hold: all of it while they are closed, then less and less of the pull at the release
-  capacity = opening ? maximum(pull - grip_force * friction, zero) : grip_force * friction;
+  capacity = opening ? maximum(pull - row[STEP_GRIP_FORCE] * friction, zero) : row[STEP_GRIP_FORCE] * friction;
+};
 
-  // ---- predicted state, and what the step starts from
-  for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
-    const real x1 = X1(k, i), v1 = V1(k, i), y = x1 + past * (x1 - X2(k, i));
-    const bool led = k < 3 && i == MID && attached;
+// The predicted state, and what the step starts from
+auto predict = [&](const scalar* row, const real (&target)[3]) {
+  const scalar h = row[STEP_H], past = row[STEP_PAST], bh = row[STEP_BETA] * h;
+  for (int i = member; i < SECTIONS; i += TEAM) UNROLL for (int k = 0; k < DOFS; ++k) {
+    const real x1 = LAST(k, i), v1 = LAST_RATE(k, i), y = x1 + past * (x1 - LAST_BUT_ONE(k, i));
+    const bool led = k < 3 && i == MIDDLE && attached;
     const real x = led ? target[k < 3 ? k : 0] : moves(i, k) ? x1 + h * v1 : x1;
-    X(k, i) = x; XP(k, i) = x; Y(k, i) = y;
-    XH(k, i) = y + bh * (v1 + past * (v1 - V2(k, i))) - (k == 2 ? gravity * bh * bh : (SC)0);
+    NOW(k, i) = x; PREDICTED(k, i) = x; FROM(k, i) = y;
+    INERTIAL(k, i) = y + bh * (v1 + past * (v1 - RATE_BEFORE(k, i))) - (k == 2 ? gravity * bh * bh : (scalar)0);
   }
-#if RUBBER
-  recall(row, relax);
-#endif
-  SYNC;
-  update_air_drag(relax);
-  SYNC;
+};
 
-  // ---- Regularised Newton's method with a Hessian that may be frozen: (H + shift I) change = residual
-  //
-  //   fresh    H is of this iterate. Where it is indefinite, or its step goes far, the step is rejected and the
-  //            diagonal is shifted more (Levenberg), else less. Convergence is quadratic: a change c leaves one of some c^2.
-  //   frozen   H is that of the iterate before (the chord method; Kelley, Solving Nonlinear Equations with Newton's Method,
-  //            2003). Convergence is linear: two changes c0, c1 leave c1^2 / (c0 - c1). A step that does not halve the
-  //            last change, or follows one that was cut, is rejected.
-  //
-  // Lanes that have settled stay as they are, so that a lane never depends on its neighbours.
-  real settled = outcome != zero ? one : zero, reaction[3] = {zero, zero, zero};
+// Regularised Newton's method with a Hessian that may be frozen: (H + shift I) change = residual
+//
+//   fresh    H is of this iterate. Where it is indefinite, or its step goes far, the step is rejected and the
+//            diagonal is shifted more (Levenberg), else less. Convergence is quadratic: a change c leaves one of some c^2.
+//   frozen   H is that of the iterate before (the chord method; Kelley, Solving Nonlinear Equations with Newton's Method,
+//            2003). Convergence is linear: two changes c0, c1 leave c1^2 / (c0 - c1). A step that does not halve the
+//            last change, or follows one that was cut, is rejected.
+//
+// Slings that have settled stay as they are, so that one never depends on its neighbours. Returns the iterations.
+auto newton = [&](real (&reaction)[3]) INLINED -> int {
+  real settled = outcome != zero ? one : zero;
   real last_change = zero, full_step = zero;  // of the step before: its size, and whether it was made whole
-  shift = zero;
   int iteration = 0;
+  shift = zero;
   while (iteration < max_iterations) {
-#if AGAIN
-    fresh = iteration % 2 == 0 || iteration > 6;  // a frozen one costs half; a hard step has all fresh
-#endif
+    fresh = !REUSES_FACTORS || iteration % 2 == 0 || iteration > 6;  // a frozen one costs half; a hard step has all fresh
     ++iteration;
     solve();
     real rejected, scale, small;  // small: a change after which the step has settled
     if (fresh) {
-      const real far = change < zero + (SC)5 * step_limit ? zero : one;
-      rejected = maximum(far, change < zero + (SC)2 * tolerance ? zero : indefinite);
-      small = shift > zero ? zero + (SC)10 * tolerance : inexact > zero ? zero + tolerance : zero + close;
-      shift = rejected > zero ? maximum((SC)4 * shift, zero + (SC)0.25) : (shift < zero + (SC)0.05 ? zero : (SC)0.5 * shift);
-      scale = minimum(one, step_limit / maximum(change, zero + (SC)1e-12));
+      const real far = change < zero + (scalar)5 * step_limit ? zero : one;
+      rejected = maximum(far, change < zero + (scalar)2 * tolerance ? zero : indefinite);
+      small = shift > zero ? zero + (scalar)10 * tolerance : inexact > zero ? zero + tolerance : zero + close;
+      const real less = shift < zero + (scalar)0.05 ? zero : (scalar)0.5 * shift;
+      shift = rejected > zero ? maximum((scalar)4 * shift, zero + (scalar)0.25) : less;
+      scale = minimum(one, step_limit / maximum(change, zero + (scalar)1e-12));
       full_step = (one - rejected) * (scale < one ? zero : one);
     } else {
-      rejected = full_step > zero ? (change < (SC)0.5 * last_change ? zero : one) : one;
-      small = minimum(SQRT(maximum(tolerance * (last_change - change), zero)), zero + (SC)10 * tolerance);
+      rejected = full_step > zero ? (change < (scalar)0.5 * last_change ? zero : one) : one;
+      small = minimum(SQRT(maximum(tolerance * (last_change - change), zero)), zero + (scalar)10 * tolerance);
       scale = one; full_step = full_step * (one - rejected);
     }
     last_change = change;
     scale *= (one - settled) * (one - rejected);
     if (attached) UNROLL for (int c = 0; c < 3; ++c) {
-      const real force = hand_force(c, scale);
-      reaction[c] = settled > zero ? reaction[c] : force;
+      const real felt = hand_force(c, scale);
+      reaction[c] = settled > zero ? reaction[c] : felt;
     }
-    SYNC;
-    for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
-      const real u = scale * DX(k, i);
-      X(k, i) -= scale > zero ? u : zero;
+    WAIT_FOR_TEAM;
+    for (int i = member; i < SECTIONS; i += TEAM) UNROLL for (int k = 0; k < DOFS; ++k) {
+      const real u = scale * CHANGE(k, i);
+      NOW(k, i) -= scale > zero ? u : zero;
     }
     settled = change < small ? maximum(settled, one - rejected) : settled;
     settled = imbalance < balance ? one : settled;
     if (ALL(settled > zero)) break;
   }
-  iterations += iteration;
-  SYNC;
-  // a lane that did not converge, or is no number, has failed for good
-  outcome = outcome != zero ? outcome : (settled > zero ? zero : zero + (SC)OUTCOME_NOT_CONVERGED);
+  WAIT_FOR_TEAM;
+  // a sling that did not converge, or is no number, has failed for good
+  outcome = outcome != zero ? outcome : (settled > zero ? zero : zero + (scalar)OUTCOME_NOT_CONVERGED);
+  return iteration;
+};
 
-  // ---- the force of the band on the hand, and whether the pads still hold it
-  real force[3];
+// The force of the band on the hand, and whether the pads still hold it
+auto feel_band = [&](const real (&reaction)[3]) {
   UNROLL for (int c = 0; c < 3; ++c) {
     force[c] = attached ? -reaction[c] : opening ? capacity * direction[c] : zero;
     held[c] = attached ? force[c] : held[c];
   }
   if (gripped) {
     pull = SQRT(dot(force, force));
-    outcome = outcome != zero ? outcome : (pull > capacity ? zero + (SC)OUTCOME_SLIPPED : zero);  // slipped out of closed fingers
-    UNROLL for (int c = 0; c < 3; ++c) direction[c] = force[c] / maximum(pull, zero + (SC)1e-9);
+    outcome = outcome != zero ? outcome : (pull > capacity ? zero + (scalar)OUTCOME_SLIPPED : zero);  // out of closed fingers
+    UNROLL for (int c = 0; c < 3; ++c) direction[c] = force[c] / maximum(pull, zero + (scalar)1e-9);
   }
+};
 
-  // ---- the projectile separates at the first pull: contact = m (acceleration + gravity) along the launch direction
-  if (grip == GRIP_FREE && launching) {
-    real contact = zero, position[3], velocity[3];
-    lowest = outcome == zero ? minimum(lowest, X1(2, MID)) : lowest;
-    UNROLL for (int c = 0; c < 3; ++c) {
-      position[c] = X(c, MID);
-      velocity[c] = (position[c] - Y(c, MID)) * ibh;
-      const real v1 = V1(c, MID), v = v1 + past * (v1 - V2(c, MID));
-      contact += payload * ((velocity[c] - v) * ibh + (c == 2 ? gravity : (SC)0)) * direction[c];
-    }
-    const real before = step > first_free ? contact_before : contact;
-    const real w = minimum(maximum(before / maximum(before - contact, zero + (SC)1e-9), zero), one);
-    const real separates = (payload > zero ? one : zero) * (contact > zero ? zero : one);
-    UNROLL for (int c = 1; c < 3; ++c) {
-      const real x1 = X1(c, MID), v1 = V1(c, MID);
-      separation[c] = separates > zero ? x1 + w * (position[c] - x1) : separation[c];
-      separation[2 + c] = separates > zero ? v1 + w * (velocity[c] - v1) : separation[2 + c];
-    }
-    separation[0] = separates > zero ? time - ((SC)1 - w) * h : separation[0];
-    payload = separates > zero ? zero : payload;
-    const real restless = dot(owed, owed) > (SC)1e-10 ? zero + (SC)OUTCOME_NOT_CONVERGED : zero;  // the arm, when it let go
-    outcome = outcome != zero ? outcome : restless != zero ? restless : separates * (SC)OUTCOME_SEPARATED;  // done: a finished launch
-    contact_before = contact;
+// The projectile separates at the first pull: contact = m (acceleration + gravity) along the launch direction
+auto separate = [&](const scalar* row, bool just_free) {
+  const scalar h = row[STEP_H], past = row[STEP_PAST];
+  real contact = zero, position[3], velocity[3];
+  lowest = outcome == zero ? minimum(lowest, LAST(2, MIDDLE)) : lowest;
+  UNROLL for (int c = 0; c < 3; ++c) {
+    position[c] = NOW(c, MIDDLE);
+    velocity[c] = (position[c] - FROM(c, MIDDLE)) * per_step;
+    const real v1 = LAST_RATE(c, MIDDLE), v = v1 + past * (v1 - RATE_BEFORE(c, MIDDLE));
+    contact += payload * ((velocity[c] - v) * per_step + (c == 2 ? gravity : (scalar)0)) * direction[c];
   }
+  const real before = just_free ? contact : contact_before;
+  const real w = minimum(maximum(before / maximum(before - contact, zero + (scalar)1e-9), zero), one);
+  const real separates = (payload > zero ? one : zero) * (contact > zero ? zero : one);
+  UNROLL for (int c = 1; c < 3; ++c) {
+    const real x1 = LAST(c, MIDDLE), v1 = LAST_RATE(c, MIDDLE);
+    separation[c] = separates > zero ? x1 + w * (position[c] - x1) : separation[c];
+    separation[2 + c] = separates > zero ? v1 + w * (velocity[c] - v1) : separation[2 + c];
+  }
+  separation[0] = separates > zero ? row[STEP_TIME] - ((scalar)1 - w) * h : separation[0];
+  payload = separates > zero ? zero : payload;
+  const real restless = dot(owed, owed) > (scalar)1e-10 ? zero + (scalar)OUTCOME_NOT_CONVERGED : zero;  // the arm, when it let go
+  const real left = restless != zero ? restless : separates * (scalar)OUTCOME_SEPARATED;
+  outcome = outcome != zero ? outcome : left;
+  contact_before = contact;
+};
 
-  // ---- records: force and iterations; centre lines (with a frame_width of N all degrees of freedom) at the camera's stamps
+// Force and iterations; centre lines (with a frame_width of DOFS all degrees of freedom) at the camera's stamps
+auto record = [&](int step, int iteration) {
   if (member == 0 && !launching) {
-    UNROLL for (int c = 0; c < 3; ++c) OUT[OUTPUT_SIZE * step + OUTPUT_FORCE + c] = force[c];
-    OUT[OUTPUT_SIZE * step + OUTPUT_ITERATIONS] = zero + (SC)iteration;
+    auto here = OF_SLING(output, OUTPUT_SIZE * steps) + OUTPUT_SIZE * step;
+    UNROLL for (int c = 0; c < 3; ++c) here[OUTPUT_FORCE + c] = force[c];
+    here[OUTPUT_ITERATIONS] = zero + (scalar)iteration;
   }
-  SYNC;
+  auto seen = OF_SLING(frames, frame_width * SECTIONS * n_frames);
   for (int k = frame_first.data[step]; k < frame_first.data[step + 1]; ++k) {
-    const SC w = frame_weight.data[k];
-    for (int i = member; i < L; i += T) for (int c = 0; c < frame_width; ++c)
-      FRAME[(k * L + i) * frame_width + c] = X1(c, i) + w * (X(c, i) - X1(c, i));
+    const scalar w = frame_weight.data[k];
+    for (int i = member; i < SECTIONS; i += TEAM) for (int c = 0; c < frame_width; ++c)
+      seen[(k * SECTIONS + i) * frame_width + c] = LAST(c, i) + w * (NOW(c, i) - LAST(c, i));
   }
-#if RUBBER
+};
+
+for (int i = member; i < SECTIONS; i += TEAM) UNROLL for (int k = 0; k < DOFS; ++k) {
+  const real x = initial[k * SECTIONS + i];
+  LAST(k, i) = x; LAST_BUT_ONE(k, i) = x; LAST_RATE(k, i) = zero; RATE_BEFORE(k, i) = zero; NOW(k, i) = x;
+}
+WAIT_FOR_TEAM;
+begin_memory();
+WAIT_FOR_TEAM;
+for (int step = 0; step < steps; ++step) {
+  const scalar* row = schedule.data + (size_t)step * STEP_SIZE;
+  const bool relax = row[STEP_MODE] == MODE_RELAX;
+  per_step = (scalar)1 / (row[STEP_BETA] * row[STEP_H]); per_step2 = per_step * per_step;
+  bend_share = bending * row[STEP_BENDING]; torsion = radius2 / 4 * row[STEP_BENDING];  // guesses relax with less of them first
+  damp = damping * per_step; damp_shape = damp * shape_damping; air = relax ? zero : drag * per_step;
+  real target[3], reaction[3] = {zero, zero, zero};
+  lead_hand(row, target);
+  predict(row, target);
+  recall(row, relax);
+  WAIT_FOR_TEAM;
+  update_air(relax);
+  WAIT_FOR_TEAM;
+  const int iteration = newton(reaction);
+  iterations += iteration;
+  feel_band(reaction);
+  if ((int)row[STEP_GRIP] == GRIP_FREE && launching) separate(row, step <= first_free);
+  record(step, iteration);
+  WAIT_FOR_TEAM;
   remember(row, relax);
-#endif
-  for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
-    const real now = X(k, i), v = relax ? zero : (now - Y(k, i)) * ibh;
-    X2(k, i) = relax ? now : X1(k, i); X1(k, i) = now;
-    V2(k, i) = relax ? zero : V1(k, i); V1(k, i) = v;
+  for (int i = member; i < SECTIONS; i += TEAM) UNROLL for (int k = 0; k < DOFS; ++k) {
+    const real now = NOW(k, i), v = relax ? zero : (now - FROM(k, i)) * per_step;
+    LAST_BUT_ONE(k, i) = relax ? now : LAST(k, i); LAST(k, i) = now;
+    RATE_BEFORE(k, i) = relax ? zero : LAST_RATE(k, i); LAST_RATE(k, i) = v;
   }
-  SYNC;
+  WAIT_FOR_TEAM;
   if (launching && ALL(outcome != zero)) break;
 }
 
-for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) INITIAL[k * L + i] = X1(k, i);
+for (int i = member; i < SECTIONS; i += TEAM) UNROLL for (int k = 0; k < DOFS; ++k) initial[k * SECTIONS + i] = LAST(k, i);
 if (member == 0) {
-  LANE[LANE_PAYLOAD] = payload; LANE[LANE_OUTCOME] = outcome; LANE[LANE_LOWEST] = lowest;
-  UNROLL for (int c = 0; c < 5; ++c) LANE[LANE_SEPARATION + c] = separation[c];
-  UNROLL for (int c = 0; c < 3; ++c) LANE[LANE_HOLD_FORCE + c] = held[c];
-  LANE[LANE_ITERATIONS] = zero + (SC)iterations;
+  lane[LANE_PAYLOAD] = payload; lane[LANE_OUTCOME] = outcome; lane[LANE_LOWEST] = lowest;
+  UNROLL for (int c = 0; c < 5; ++c) lane[LANE_SEPARATION + c] = separation[c];
+  UNROLL for (int c = 0; c < 3; ++c) lane[LANE_HOLD_FORCE + c] = held[c];
+  lane[LANE_ITERATIONS] = zero + (scalar)iterations;
 }

@@ -18,7 +18,7 @@ ends are nodes to be led, not attachments; nodes.json says which, and where.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import entry_points
@@ -200,21 +200,25 @@ def nominal(stretch: np.ndarray, poisson: float) -> np.ndarray:
 
 
 def text(band: UsdBand) -> str:
-    """The stage: scene, material, the straight band."""
-    rest = band.tube.rest
-    return STAGE % {
-        "gravity": GRAVITY,
-        "rate": RATE,
+    """The exported stage: scene, material, the straight band."""
+    values = {name: getattr(band, name) for name in ("young", "poisson", "friction")}
+    named = {"material": "Rubber", "name": "Band", "place": ""}
+    return stage(band.tube, [{**values, **named, "damping": 0.0}])
+
+
+def stage(tube: Tube, bands: Iterable[Mapping[str, object]]) -> str:
+    """A stage of equal straight bands: for each what BAND names and the mesh does not have."""
+    rest = tube.rest
+    mesh = {
         "iterations": ITERATIONS,
-        "young": band.young,
-        "poisson": band.poisson,
-        "friction": band.friction,
-        "mass": band.mass,
+        "mass": tube.mass.sum(),
         "rest": _tuples(rest.reshape(-1, 3)),
-        "tetrahedra": _tuples(band.tube.tetrahedra),
-        "faces": _tuples(surface(band.tube.tetrahedra)),
+        "tetrahedra": _tuples(tube.tetrahedra),
+        "faces": _tuples(surface(tube.tetrahedra)),
         "extent": _tuples(np.stack([rest.min((0, 1)), rest.max((0, 1))])),
     }
+    head = SCENE % {"gravity": GRAVITY, "rate": RATE}
+    return head + "".join(BAND % {**mesh, **band} for band in bands) + "}\n"
 
 
 def surface(tetrahedra: np.ndarray) -> np.ndarray:
@@ -231,7 +235,7 @@ def _tuples(rows: np.ndarray) -> str:
     return "[" + ", ".join(f"({', '.join(format(v, form) for v in row)})" for row in shown) + "]"
 
 
-STAGE = """#usda 1.0
+SCENE = """#usda 1.0
 (
     defaultPrim = "World"
     kilogramsPerUnit = 1
@@ -250,17 +254,18 @@ def Xform "World"
         token physxScene:solverType = "TGS"
         uint physxScene:timeStepsPerSecond = %(rate)d
     }
-
-    def Material "Rubber" (prepend apiSchemas = ["PhysicsMaterialAPI",
+"""
+BAND = """
+    def Material "%(material)s" (prepend apiSchemas = ["PhysicsMaterialAPI",
         "OmniPhysicsDeformableMaterialAPI", "PhysxDeformableMaterialAPI"])
     {
         float omniphysics:dynamicFriction = %(friction).9g
         float omniphysics:poissonsRatio = %(poisson).9g
         float omniphysics:youngsModulus = %(young).9g
-        float physxDeformableMaterial:elasticityDamping = 0
+        float physxDeformableMaterial:elasticityDamping = %(damping).9g
     }
 
-    def TetMesh "Band" (prepend apiSchemas = ["OmniPhysicsDeformableBodyAPI",
+    def TetMesh "%(name)s" (prepend apiSchemas = ["OmniPhysicsDeformableBodyAPI",
         "OmniPhysicsVolumeDeformableSimAPI", "OmniPhysicsDeformablePoseAPI:default",
         "PhysicsCollisionAPI", "MaterialBindingAPI", "PhysxBaseDeformableBodyAPI"])
     {
@@ -274,12 +279,11 @@ def Xform "World"
         float3[] extent = %(extent)s
         point3f[] omniphysics:restShapePoints = %(rest)s
         int4[] omniphysics:restTetVtxIndices = %(tetrahedra)s
-        rel material:binding:physics = </World/Rubber> (
+        rel material:binding:physics = </World/%(material)s> (
             bindMaterialAs = "weakerThanDescendants"
         )
         point3f[] points = %(rest)s
         int3[] surfaceFaceVertexIndices = %(faces)s
         int4[] tetVertexIndices = %(tetrahedra)s
-    }
-}
+%(place)s    }
 """

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sling2sim2real.exporting.mesh import Tube
-from sling2sim2real.exporting.usd import RATE, stage
+from sling2sim2real.exporting.usd import STEPS_PER_S, stage
 
 SPACING = np.array([1.0, 2.5])  # m along x and y from band to band: none reaches the next
 COLUMNS = 32
@@ -40,7 +40,7 @@ class Drive:
 def job(tube: Tube, start: np.ndarray, phases: list[Drive]) -> dict:
     """What is done with the N bands of a stage, whose nodes begin at `start` (N, nodes, 3) [m]."""
     content = {
-        "step": 1 / RATE,
+        "step": 1 / STEPS_PER_S,
         "phases": len(phases),
         "offsets": offsets(len(start)),
         "rest": tube.rest.reshape(-1, 3),

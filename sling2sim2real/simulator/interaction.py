@@ -116,8 +116,8 @@ def schedule_of(sling: ClampedBand, episode: Episode, refine: int = 1) -> Schedu
 def _held_times(hand: CubicSpline, episode: Episode, size, refine: int) -> np.ndarray:
     """Ends of the steps from grasp to release [s]: as long as the hand goes nearly straight.
 
-    A step of h bows from its chord by h^2 |a| / 8, at most LARGEST_BOW_M, and a band that the hand holds
-    follows it. Between `grip_step` and `hold_step`.
+    A step of h bows from its chord by h^2 |a| / 8, at most LARGEST_BOW_M, and a band that the hand
+    holds follows it. Between `grip_step` and `hold_step`.
     """
     from scipy.ndimage import maximum_filter1d
 

@@ -17,8 +17,7 @@ from pipeline.params.run import Pair
 from sling2sim2real.api.band_folder import SIZES, BandFile, BandFolder, differences
 from sling2sim2real.api.identification import Identification, fork_of
 from sling2sim2real.api.model import Band, Theta, with_band
-from sling2sim2real.base.files import replacing_folder
-from sling2sim2real.base.layout import made
+from sling2sim2real.base.files import made, replacing_folder
 from sling2sim2real.base.schema import read_json
 from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.inputs import CardInputs, aims_of

@@ -9,7 +9,7 @@ region.
 from __future__ import annotations
 
 from pipeline.layout import Layout
-from sling2sim2real.base.layout import made
+from sling2sim2real.base.files import made
 from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.identification.searches.regions import regions_of, save_regions
 from stages.start import pair_of_stage, run

@@ -11,7 +11,7 @@ SLING_WORKERS say where it runs.
 from __future__ import annotations
 
 from pipeline.layout import Layout
-from sling2sim2real.base.layout import made
+from sling2sim2real.base.files import made
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.pull import launch_history
 from sling2sim2real.identification.objective.evaluate import logging_evaluator

@@ -13,8 +13,7 @@ from __future__ import annotations
 import sys
 
 from pipeline.layout import Layout
-from sling2sim2real.base.files import replacing_folder
-from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.files import NotMade, replacing_folder
 from sling2sim2real.recording.build import build_episodes
 from sling2sim2real.recording.files import once
 from stages.start import recording_of_stage, run

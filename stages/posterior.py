@@ -10,8 +10,8 @@ data/evaluations/<pair>.parquet; intervals, and samples of them, to data/confide
 from __future__ import annotations
 
 from pipeline.layout import Layout
+from sling2sim2real.base.files import made
 from sling2sim2real.base.launches_file import read_launches
-from sling2sim2real.base.layout import made
 from sling2sim2real.base.machine import workers
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.posterior.confidence import (

@@ -14,7 +14,7 @@ from pipeline.params import Params, load
 from pipeline.params.run import Pair, Recording
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.files import NotMade
 
 OF_DVC = "DVC_STAGE"  # in the environment of what DVC runs
 OF_FLOW = "SLING_FLOW"  # process id of the `sling` command that started that DVC

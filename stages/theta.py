@@ -11,8 +11,7 @@ best of all evaluations, and "confidence" is null.
 from __future__ import annotations
 
 from pipeline.layout import Layout
-from sling2sim2real.base.files import write_json
-from sling2sim2real.base.layout import made
+from sling2sim2real.base.files import made, write_json
 from sling2sim2real.base.parameters import TABLE
 from sling2sim2real.identification.results.evaluations import TERMS, Evaluations, theta_content
 from sling2sim2real.identification.results.theta import load_confidence

@@ -25,6 +25,7 @@ ROW = Parameter(
 )
 parameters.TABLE = (*parameters.TABLE, ROW)
 
+from sling2sim2real.api.model import Theta  # noqa: E402
 from sling2sim2real.card.values import values  # noqa: E402
 from sling2sim2real.identification.objective.box import SearchBox  # noqa: E402
 from sling2sim2real.identification.posterior.coordinates import Coordinates  # noqa: E402
@@ -56,6 +57,7 @@ def main(folder: Path) -> None:
     sling = ClampedBand.of(sizes, params.setup, params.sling, law="rubber")
     box = SearchBox.of_method(params, method)
     assert NAME in box.free and box.high[box.names.index(NAME)] == 0.4
+    assert Theta(2e5, 0.47, 2e-3, 0.7, 0.6, **{NAME: 0.1}).content("band")["theta"][NAME] == 0.1
     density = Coordinates.of_method(params, method, sling)
     place = density.names.index(NAME)
     assert density.steps[place] == 0.02 and density.precision[place] == 0.1**-2

@@ -27,7 +27,7 @@ from pipeline.params import load  # noqa: E402
 from pipeline.params.run import Pair  # noqa: E402
 from sling2sim2real.base import errors  # noqa: E402
 from sling2sim2real.base.errors import UserError  # noqa: E402
-from sling2sim2real.base.layout import made  # noqa: E402
+from sling2sim2real.base.files import made  # noqa: E402
 from sling2sim2real.card import animation  # noqa: E402
 from sling2sim2real.card.animation import Frame, ReleaseFrames, font, save  # noqa: E402
 from sling2sim2real.card.camera import Pictures  # noqa: E402

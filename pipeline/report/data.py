@@ -19,8 +19,8 @@ from pipeline.layout import Layout
 from pipeline.params import Params
 from pipeline.params.run import Pair
 from pipeline.report.paper import METHOD
+from sling2sim2real.base.files import NotMade, made
 from sling2sim2real.base.launches_file import CHECK, read_launches
-from sling2sim2real.base.layout import NotMade, made
 from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.base.target import TARGET_AREA
 from sling2sim2real.drawing.styles import Styles, styles
@@ -154,7 +154,7 @@ def gather(params: Params, root: str | Path = ".") -> Run:
     results, trials = {}, []
     for name, recording in run.recordings.items():
         pairs = {m: run.pairs[key] for m in params.methods if (key := f"{name}-{m}") in run.pairs}
-        if recording == run.first[recording.band]:
+        if name == run.first[recording.band].key:
             results[recording.band] = {m: _result(params, layout, pairs[m]) for m in pairs}
         else:
             pairs = {run.main: pairs[run.main]}

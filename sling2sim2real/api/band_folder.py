@@ -29,10 +29,9 @@ from ruamel.yaml import YAML, YAMLError
 
 from sling2sim2real.api.model import Band, with_band
 from sling2sim2real.base.errors import UserError, one_line
-from sling2sim2real.base.files import replacing
+from sling2sim2real.base.files import NotMade, replacing
 from sling2sim2real.base.fingerprint import fingerprint
 from sling2sim2real.base.launches_file import LaunchRow, read_launches
-from sling2sim2real.base.layout import NotMade
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.recording.files import SUFFIXES, sha256
 from sling2sim2real.recording.mask_folder import masks_beside

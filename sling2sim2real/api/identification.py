@@ -12,8 +12,7 @@ import numpy as np
 from sling2sim2real.api.band_folder import BandFolder
 from sling2sim2real.api.model import Band, Model, Theta
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.files import write_json
-from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.files import NotMade, write_json
 from sling2sim2real.base.schema import JsonRecord, Pose, read_json
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.theta import Mounting, ThetaFile

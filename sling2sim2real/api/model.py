@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, make_dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.machine import cores
+from sling2sim2real.base.parameters import Parameter, parameters
 from sling2sim2real.base.schema import explained, read_json
 from sling2sim2real.identification.results.theta import Mounting, ThetaFile, parameters_of
 from sling2sim2real.launching.surface.landing_map import LandingMap
@@ -61,9 +63,21 @@ class Band:
             raise UserError(f"Band: {explained(error, BandParams)} (kg, m)") from error
 
 
+def _field(row: Parameter) -> tuple:
+    """Of a dataclass: THETA must be given, and what only rubber has is None unless it is."""
+    if row.name in THETA:
+        return row.name, float
+    return (row.name, float | None, None) if row.law else (row.name, float, row.default)
+
+
+_Values: Any = make_dataclass(
+    "_Values", [*map(_field, parameters(RUBBER)), ("law", str, "")], frozen=True
+)
+
+
 @dataclass(frozen=True)
-class Theta:
-    """The parameters θ of a band; the five are the paper's.
+class Theta(_Values):
+    """The parameters θ of a band, those of the table; the first five are the paper's.
 
     With some of those that are of rubber the material is of that law, without them it is
     neo-Hookean unless `law` says "corotated". A value that no material has is a UserError.
@@ -95,22 +109,6 @@ class Theta:
         returned_share: Energy that a launch gets over what the law gives it.
         law: Of the material: neo_hookean, rubber or corotated.
     """
-
-    youngs_modulus: float
-    poissons_ratio: float
-    elasticity_damping: float
-    dynamic_friction: float
-    damping_scale: float
-    mooney_share: float | None = None
-    upturn: float | None = None
-    softening: float | None = None
-    relaxation: float | None = None
-    flow: float | None = None
-    log_flow_rate: float | None = None
-    air_drag: float = 0.0
-    turn_damping: float = 0.0
-    returned_share: float = 1.0
-    law: str = ""
 
     def __post_init__(self) -> None:
         for attribute in fields(self):

@@ -22,6 +22,29 @@ if TYPE_CHECKING:
     from pyarrow import Table
 
 
+class NotMade(UserError):
+    """A file that something else makes is missing, or not whole; by its place alone.
+
+    Attributes:
+        path: Of the file.
+        problem: What is wrong with it.
+    """
+
+    def __init__(self, path: Path, problem: str = "missing") -> None:
+        super().__init__(path, problem)
+        self.path, self.problem = Path(path), problem
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.problem}"
+
+
+def made(path: Path) -> Path:
+    """`path`, which must be a file. Raises NotMade."""
+    if not path.is_file():
+        raise NotMade(path)
+    return path
+
+
 @contextmanager
 def replacing_folder(path: Path) -> Iterator[Path]:
     """Give an empty folder beside `path`, which takes its place on success, whatever was there.

@@ -25,7 +25,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from sling2sim2real.base.errors import one_line
-from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.files import NotMade
 
 
 class Section(BaseModel):

@@ -9,8 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from sling2sim2real.base.files import replacing_folder, write_json
-from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.files import NotMade, replacing_folder, write_json
 from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.recording import images

@@ -24,9 +24,8 @@ from sling2sim2real.api.launching import draw_for
 from sling2sim2real.api.model import Model, Theta
 from sling2sim2real.base.disk import expect_writable
 from sling2sim2real.base.errors import UserError, printable
-from sling2sim2real.base.files import replacing, replacing_folder, write_json
+from sling2sim2real.base.files import NotMade, replacing, replacing_folder, write_json
 from sling2sim2real.base.fingerprint import fingerprint
-from sling2sim2real.base.layout import NotMade
 from sling2sim2real.base.schema import JsonRecord, read_json
 from sling2sim2real.cli.steps import Steps
 from sling2sim2real.episode.episode import Episode

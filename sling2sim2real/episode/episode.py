@@ -16,8 +16,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from sling2sim2real.base.files import column, read_table, replacing
-from sling2sim2real.base.layout import NotMade, made
+from sling2sim2real.base.files import NotMade, column, made, read_table, replacing
 
 SCHEMA_VERSION = 1
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.layout import Layout
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.files import NotMade
 from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.camera_view import CameraView
 from sling2sim2real.card.simulated import Simulated, simulate

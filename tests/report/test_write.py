@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from pipeline.report.report import HTML, write
-from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.files import NotMade
 from tests.project import with_
 from tests.report.conftest import BAND, PAIR
 from tests.report.toy_run import run_of, write_run

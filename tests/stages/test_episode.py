@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.layout import Layout
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.files import NotMade
 from sling2sim2real.episode.episode import Episode
 from stages import episode
 from tests.recording.conftest import blind, params, seen

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from pipeline.params import load
-from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.files import NotMade
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluation
 from sling2sim2real.identification.objective.loss import TERMS

@@ -20,7 +20,7 @@ from threading import Lock
 from typing import TypeVar
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.layout import made
+from sling2sim2real.base.files import made
 from sling2sim2real.base.machine import cores
 from sling2sim2real.base.pool import Pool
 from validation.reports import plain

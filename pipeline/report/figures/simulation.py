@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.data import Result, Run
 from pipeline.report.figures.panels import DASHES, WIDTH, entitle, explain
-from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.files import NotMade
 from sling2sim2real.drawing.canvas import key, mark, picture
 from sling2sim2real.drawing.styles import INK, Style, Styles
 from sling2sim2real.episode.episode import Episode

@@ -25,8 +25,7 @@ import numpy as np
 from pydantic import Field, create_model, model_validator
 
 from sling2sim2real.base.errors import printable
-from sling2sim2real.base.files import write_json
-from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.files import NotMade, write_json
 from sling2sim2real.base.parameters import TABLE, Parameter
 from sling2sim2real.base.schema import (
     FILLED,

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from sling2sim2real.base.layout import NotMade, made
+from sling2sim2real.base.files import NotMade, made
 from sling2sim2real.base.schema import LIST, JsonRecord, read_json
 
 

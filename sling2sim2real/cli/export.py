@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sling2sim2real.exporting.card import HOLD_LIMIT, LANDING_LIMIT
+from sling2sim2real.exporting.match import HOLD_LIMIT, LANDING_LIMIT
 
 
 def shown(folder: Path, content: dict) -> str:

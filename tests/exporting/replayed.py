@@ -5,9 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sling2sim2real.exporting.match import HOLD_LIMIT, LANDING_LIMIT
 from sling2sim2real.exporting.chain import SpringChain
-from sling2sim2real.exporting.match import compared, draws_of, proof_draws
+from sling2sim2real.exporting.match import (
+    HOLD_LIMIT,
+    LANDING_LIMIT,
+    compared,
+    draws_of,
+    proof_draws,
+)
 from sling2sim2real.exporting.proof import Matched
 
 DRAW = np.array([-0.35, -0.15])

@@ -108,7 +108,7 @@ def calibrate_clamps(
     young = nominal_young(sling, episode)
     solid = young * np.pi * sling.radius**4 / 4
     part = slack_part(episode)
-    loss = EpisodeLoss.plain(params, part, sling)
+    loss = EpisodeLoss.of(params, None, part, sling)
     unit_parameters = Parameters.of(
         sling.law, np.array([young, SLACK_POISSONS_RATIO, 5e-3, 1.0, 1.0])
     )

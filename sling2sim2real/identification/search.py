@@ -23,10 +23,12 @@ from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import POSTERIOR
 
 FOLDER = "sling2sim2real.identification.searches"
-OURS = {
-    "de": f"{FOLDER}.de:differential_evolution",
-    "bo": f"{FOLDER}.bo:bayesian",
-    "adam": f"{FOLDER}.adam:adam",
+OURS = {  # what their rows are called, and where they are
+    "multistart": ("de", f"{FOLDER}.de:differential_evolution"),
+    POSTERIOR: ("design", f"{__name__}:design"),
+    "de": ("de", f"{FOLDER}.de:differential_evolution"),
+    "bo": ("bo", f"{FOLDER}.bo:bayesian"),
+    "adam": ("adam", f"{FOLDER}.adam:adam"),
 }
 
 
@@ -133,19 +135,13 @@ def explore(
         UserError: There is no such search, it takes no such settings, or as `run`.
     """
     method_params, optimizer = params.methods[method], params.optimizer
-    name = {"multistart": "de"}.get(method_params.search, method_params.search)
-    box, rollouts = SearchBox.of_method(params, method), rollouts_of(params, method)
-    evaluations = Evaluations(method, box.names)
-    settings = dict(method_params.settings)
-    if name == "de":
-        moves = {"mutation": optimizer.mutation, "recombination": optimizer.recombination}
-        settings = moves | settings
-    budget = {"rollouts": rollouts, "seed": optimizer.seed, "population": optimizer.population}
-    if name == POSTERIOR:
-        phase, search = "design", design
-    else:
-        phase, search = function_of(name)
-    call = bound(search, name, len(box.free), **budget | settings)
+    name, box = method_params.search, SearchBox.of_method(params, method)
+    evaluations, rollouts = Evaluations(method, box.names), rollouts_of(params, method)
+    phase, search = function_of(name)
+    settings = {"rollouts": rollouts, "seed": optimizer.seed, "population": optimizer.population}
+    if name in ("multistart", "de"):
+        settings |= {"mutation": optimizer.mutation, "recombination": optimizer.recombination}
+    call = bound(search, name, len(box.free), **settings | method_params.settings)
     try:
         run(call, evaluate, evaluations, phase=phase, rollouts=rollouts, box=box)
     except (TypeError, ValueError) as error:
@@ -168,11 +164,11 @@ def function_of(name: str) -> tuple[str, Callable[..., None]]:
     Raises:
         UserError: There is no such function.
     """
+    phase, place = OURS.get(name, (name.rpartition(":")[2], name))
     try:
-        search = imported(OURS.get(name, name))
+        return phase, imported(place)
     except Exception as error:  # a module of the user's may raise anything
         raise _refusal(name, f"cannot be imported ({type(error).__name__}: {error})") from error
-    return (name if name in OURS else name.rpartition(":")[2]), search
 
 
 def bound(

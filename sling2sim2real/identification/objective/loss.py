@@ -82,34 +82,22 @@ class EpisodeLoss:
         self._lock = threading.Lock()
 
     @classmethod
-    def of(cls, params: Settings, method: str, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
-        """Make it from params.yaml's `loss`, `force` and `methods.<method>`."""
-        weights = dict(params.methods[method].weights)
-        return cls._weighed(params, weights, episode, sling, params.loss.chamfer)
-
-    @classmethod
-    def plain(cls, params: Settings, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
-        """Geometry, of what the camera sees, and force alone, for a part of an episode."""
-        weights = {"geom": 1.0, "force": 1.0, "work": 0.0}
-        return cls._weighed(params, weights, episode, sling, "symmetric")
-
-    @classmethod
-    def _weighed(
-        cls,
-        params: Settings,
-        weights: dict[str, float],
-        episode: Episode,
-        sling: ClampedBand,
-        chamfer: str,
+    def of(
+        cls, params: Settings, method: str | None, episode: Episode, sling: ClampedBand
     ) -> EpisodeLoss:
+        """Make it from params.yaml's `loss`, `force` and `methods.<method>`.
+
+        None: of geometry, of what the camera sees, and force alone, for a part of an episode.
+        """
+        plain = {"geom": 1.0, "force": 1.0, "work": 0.0}
         return cls(
             episode,
             radius=sling.radius,
             rest_edges=sling.edge_lengths,
-            weights=weights,
+            weights=dict(params.methods[method].weights) if method else plain,
             cutoff=cutoff_hz(params.force.cutoff, params.force.cutoff_unit),
             median_window=params.loss.median_window,
-            chamfer=chamfer,
+            chamfer=params.loss.chamfer if method else "symmetric",
         )
 
     def terms(self, rollouts: Rollouts) -> dict[str, np.ndarray]:

@@ -29,8 +29,7 @@ REACH = (-0.46, 0.36)  # y that is shown [m]
 ABOVE, BELOW = (-0.2, 0.2), (-0.27, 0.17)  # x from above, z from the side [m]
 DOT = 1  # radius of a point
 GREY, PALE = "#8a8a8a", "#c9c9c9"
-AGED, FADES = 0.03, 0.55  # s after which clouds and pictures are pale; how far pictures fade
-VEIL = 90  # the grey that they fade to
+AGED = 0.03  # s after which clouds are pale
 Frame = tuple[Image.Image, int]  # and how long it is shown [ms]
 
 
@@ -75,7 +74,6 @@ class ReleaseFrames:
         self._taken = self.pictures.time + self.simulated.camera
         self._seen = self.episode.cloud_time + self.simulated.camera
         self._picture = lru_cache(2)(self._view.picture)
-        self._veil = np.full((TALL, WIDE, 3), VEIL, np.uint8)
 
     @cached_property
     def _view(self) -> CameraView:
@@ -98,9 +96,8 @@ class ReleaseFrames:
         canvas = self._background.copy()
         line = self.simulated.line(time)
         number = max(int(np.searchsorted(self._taken, time, side="right")) - 1, 0)
-        age = self._aged(time - self._taken[number])
-        left = cv2.addWeighted(self._picture(number), 1 - FADES * age, self._veil, FADES * age, 0)
-        self._view.draw(left, line)
+        left = self._picture(number).copy()
+        self._view.draw(left, self.simulated.line(self._taken[number]))
         canvas[HEAD:, :WIDE] = left
         cloud = max(int(np.searchsorted(self._seen, time, side="right")) - 1, 0)
         age = self._aged(time - self._seen[cloud])
@@ -121,7 +118,7 @@ class ReleaseFrames:
 
     @staticmethod
     def _aged(since: float) -> float:
-        """Age of a picture or cloud, from 0 of a new one to 1 after AGED."""
+        """Age of a cloud, from 0 of a new one to 1 after AGED."""
         return float(np.clip(since / AGED, 0, 1))
 
     @cached_property
@@ -130,7 +127,9 @@ class ReleaseFrames:
         image = Image.new("RGB", (2 * WIDE, TALL + HEAD), "white")
         draw, title, small = ImageDraw.Draw(image), font(19, bold=True), font(13)
         draw.text((10, 8), "recording", fill=INK, font=title)
-        draw.text((10, 31), "camera picture, simulated band drawn in", fill=GREY, font=small)
+        draw.text(
+            (10, 31), "camera picture, with the simulated band of its time", fill=GREY, font=small
+        )
         draw.text((WIDE + 12, 8), "simulation", fill=SIMULATED, font=title)
         text = f"dots: the camera's points; {self.pace}"
         draw.text((WIDE + 12, 31), text, fill=GREY, font=small)

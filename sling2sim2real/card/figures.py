@@ -11,19 +11,15 @@ from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.camera_view import SIMULATED, CameraView
 from sling2sim2real.card.inputs import Aims, CardInputs
 from sling2sim2real.card.simulated import Simulated
-from sling2sim2real.card.values import ShownValue
 from sling2sim2real.drawing.canvas import key, mark, picture
 from sling2sim2real.drawing.styles import INK
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.identification.results.ranges import SearchedRange
-from sling2sim2real.quantities import QUANTITIES, rounded
 
 WIDTH = 6.4  # inches: words are read on a phone too
 CUT = (520, 470)  # pixels of each camera picture
 MOVED = 0.005  # s after the release: in a picture from then on the band has left the hand
 MOST_SPAN = 1.5  # m of landings on which targets find room for their names
 AROUND = (-0.3, 0.4)  # of the release, magnified [s]
-BARS = "#0072b2"  # beside black and magenta, distinct for any eye
 TITLE = {"fontsize": 11, "fontweight": "bold"}
 KINDS = {"measured": ("o", "measured"), "virtual": ("D", "virtual rig")}
 
@@ -101,42 +97,6 @@ def force(episode: Episode, simulated: Simulated) -> Figure:
         "residual z": mark(color=INK, lw=1.1, ls=":"),
     }
     key(figure, entries.items(), columns=2)
-    return figure
-
-
-@picture(dpi=110)
-def values(shown: list[ShownValue], boxes: dict[str, SearchedRange]) -> Figure:
-    """Plot each searched value's interval as a bar within its box, which is given by name."""
-    rows = [value for value in shown if value.name in boxes and value.low is not None]
-    figure, ax = plt.subplots(figsize=(WIDTH, 0.62 * max(len(rows), 1) + 0.9))
-    for row, quantity in enumerate(rows):
-        assert (
-            quantity.low is not None and quantity.high is not None
-        )  # both are known, or neither is
-        box, factor = boxes[quantity.name], QUANTITIES[quantity.name].factor
-        box = SearchedRange(factor * box.low, factor * box.high, box.scale)
-        begin, end = box.place(quantity.low), box.place(quantity.high)
-        ax.barh(row, 1, height=0.3, color="0.95", zorder=1)
-        if quantity.prior:
-            before = np.sort([box.place(end) for end in quantity.prior])
-            ax.barh(row, np.ptp(before), left=before[0], height=0.3, color="0.86", zorder=1)
-        ax.barh(row, end - begin, left=begin, height=0.3, color=BARS, alpha=0.55, zorder=2)
-        ax.plot(
-            [box.place(quantity.value)] * 2, [row - 0.15, row + 0.15], color=INK, lw=2, zorder=3
-        )
-        for side, bound in ((0, box.low), (1, box.high)):
-            at = side + 0.02 * (2 * side - 1), row
-            words = {"fontsize": 8, "color": "0.45", "va": "center"}
-            ax.text(*at, f"{rounded(bound):.6g}", ha=("right", "left")[side], **words)
-        ends = f"({quantity.low:g} to {quantity.high:g})"
-        text = f"{quantity.label}: {quantity.value:g} {ends} {quantity.unit}"
-        ax.text(0, row - 0.22, text, va="bottom", fontsize=9)
-    ax.set(xlim=(-0.1, 1.12), xticks=[], yticks=[], ylim=(len(rows) - 0.7, -0.75))
-    ax.grid(False)
-    for side in ax.spines.values():
-        side.set_visible(False)
-    title = "How well are the values known?\nBars: 90 % intervals; grey: without the recording"
-    figure.suptitle(title, **TITLE)
     return figure
 
 

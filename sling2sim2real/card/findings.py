@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import ndtri
 
-from sling2sim2real.card.inputs import CardInputs
+from sling2sim2real.card.inputs import CardInputs, sides
 from sling2sim2real.card.verdict import FURTHER, Findings
 from sling2sim2real.drawing.names import as_code, as_text
 from sling2sim2real.episode.episode import Episode
@@ -44,6 +44,7 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
     unlikely = [launch.get("z_without_it") for launch in evidence]
     left = [abs(launch["left"]) for launch in evidence if launch["left"] is not None]
     miss = np.abs(aims.landing - aims.target)
+    widest = int(np.argmax(aims.half_width))
     return Findings(
         cautions=_cautions(inputs.episodes),
         settled=confidence.get("settled"),
@@ -67,6 +68,7 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
         converged=inputs.trained is not False,
         miss=float(np.nanmax(miss, initial=0.0)),
         half_width=float(aims.half_width.max()),
+        sides=sides(aims.landing[widest], aims.interval[widest]),
         outside=int(((landing < low) | (landing > high)).sum()),
         scores=len(scored),
         off=_known(off.abs().mean()),

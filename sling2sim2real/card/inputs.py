@@ -47,6 +47,17 @@ class Aims:
         """Half widths of the intervals [m], shape (T,)."""
         return np.diff(self.interval, axis=1)[:, 0] / 2
 
+    @property
+    def median(self) -> np.ndarray:
+        """Median landings of the samples of θ [m], shape (T,); NaN where any fails."""
+        return np.median(self.spread.centres, axis=1)
+
+
+def sides(landing: float, interval: np.ndarray) -> str:
+    """How far an interval reaches to either side of a landing [cm], as in "−70/+8"."""
+    low, high = 100 * (np.asarray(interval) - landing)
+    return f"{low:+.0f}/{high:+.0f}".replace("-", "−")
+
 
 @dataclass(frozen=True)
 class CardInputs:

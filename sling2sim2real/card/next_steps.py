@@ -65,11 +65,11 @@ def next_steps(
         aim = len(targets) // 2
         before = model.half_width[aim]
         words = {"a": "another" if launches else "a"}
-        words |= {"at": f"at {targets[aim]:g} m", "before": f"±{_cm(before)} cm"}
+        words["narrows"] = f"the interval at {targets[aim]:g} m narrows from {_cm(before)}"
         gains = _gains(model, aim, episodes, unloaded)
         for gain in sorted(gains, key=lambda gain: gain.width):
             if gain.width < (1 - LEAST) * before:
-                steps.append(gain.text.format(**words, after=f"±{_cm(gain.width)} cm"))
+                steps.append(gain.text.format(**words, after=f"{_cm(gain.width)} cm"))
     if not steps:
         steps.append("Nothing more would narrow the landings by much: launch.")
     return steps[:MOST]
@@ -80,32 +80,32 @@ def _gains(
 ) -> Iterator[Gain]:
     single, more = (model.after(model.launched(aim, TAPE, count))[aim] for count in (1, LAUNCHES))
     yield Gain(
-        "Measure {a} launch and tell it with `sling observe`: {before} {at} become"
-        f" {{after}}, with {LAUNCHES} launches ±{_cm(more)} cm.",
+        "Measure {a} launch and tell it with `sling observe`: {narrows} to {after}, with"
+        f" {LAUNCHES} launches to {_cm(more)} cm.",
         single,
     )
     if not unloaded and DIP[0] in model.names:
         yield Gain(
-            f"{A_DIP}: {{before}} {{at}} become about {{after}}.",
+            f"{A_DIP}: {{narrows}} to about {{after}}.",
             model.after(model.known(DIP[0], spread=DIP[1]))[aim],
         )
     yield Gain(
-        "Record another pull like those that you have: {before} {at} become about {after}.",
+        "Record another pull like those that you have: {narrows} to about {after}.",
         model.after(model.pulled(len(episodes)))[aim],
     )
     yield Gain(
         "Take more pictures of the recoil, by a faster camera or by pulls that are seen at other"
-        " moments: with damping and drag known exactly, {before} {at} become {after}.",
+        " moments: with damping and drag known exactly, {narrows} to {after}.",
         model.after(model.known(*RECOIL))[aim],
     )
     if any(map(relaxing, episodes)):
         yield Gain(
             "Pause longer before the release, for the force was still falling: with stiffness and"
-            " relaxation known exactly, {before} {at} become {after}.",
+            " relaxation known exactly, {narrows} to {after}.",
             model.after(model.known(*PULL))[aim],
         )
     yield Gain(
-        "Draw more exactly: by an arm without error, {before} {at} become {after}.",
+        "Draw more exactly: by an arm without error, {narrows} to {after}.",
         model.after(draw=0.0)[aim],
     )
 
@@ -122,5 +122,7 @@ def relaxing(episode: Episode) -> bool:
     return bool(early - late > STILL * late)
 
 
-def _cm(width: float) -> str:
+def _cm(half_width: float) -> str:
+    """A whole width."""
+    width = 2 * half_width
     return f"{100 * width:.1f}" if width < 0.095 else f"{100 * width:.0f}"

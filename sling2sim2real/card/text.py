@@ -8,7 +8,7 @@ import numpy as np
 
 from sling2sim2real.base.template import filled
 from sling2sim2real.card.conclusion import Conclusion
-from sling2sim2real.card.inputs import CardInputs
+from sling2sim2real.card.inputs import CardInputs, sides
 from sling2sim2real.card.verdict import CARE, NO, TRUSTED, launches_of
 from sling2sim2real.drawing.names import as_code
 
@@ -19,7 +19,8 @@ SAID = {TRUSTED: "can be trusted", CARE: "use with care", NO: "do not use it"}
 def card_text(inputs: CardInputs, concluded: Conclusion, *, linked: bool = True) -> str:
     """README.md of a card; without links to other files where it is to stand alone."""
     aims, launches = inputs.aims, inputs.launches
-    draws = aims.target, aims.draw, aims.landing, aims.failure, aims.interval, aims.hold_force
+    expected = aims.landing, aims.failure, aims.interval, aims.median
+    draws = aims.target, aims.draw, *expected, aims.hold_force
     tried = sorted(inputs.launched.kind.value_counts().items())
     return filled(
         Path(__file__).with_name("card.md.j2"),
@@ -35,6 +36,7 @@ def card_text(inputs: CardInputs, concluded: Conclusion, *, linked: bool = True)
         shown=concluded.values,
         draws=zip(*draws, strict=True),
         finite=np.isfinite,
+        sides=sides,
         history=inputs.theta.get("history"),
         findings=concluded.findings,
         met=inputs.confidence.get("recordings"),

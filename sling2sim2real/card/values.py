@@ -28,6 +28,11 @@ class ShownValue:
     prior: tuple[float, float] | None = None
     identified: bool = True
 
+    @property
+    def outside(self) -> bool:
+        """The value lies outside its own prior's interval."""
+        return bool(self.prior and not self.prior[0] <= self.value <= self.prior[1])
+
 
 def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
     """Values of a θ file's content, in the order of QUANTITIES.

@@ -73,6 +73,7 @@ class Findings:
         failures: Of the launches, in words.
         converged: Whether the policy's training did; `miss` of its landings [m].
         half_width: Widest of the landings' intervals [m]; NaN where none is known.
+        sides: How far that one reaches to either side of the landing, in words [cm].
         outside, scores: Launches outside their intervals, of so many within the recorded stretch.
         off: How far those landed from where they were predicted, in the mean [m].
         bias, bias_error: Mean of landing over prediction, less 1, and its standard error.
@@ -105,6 +106,7 @@ class Findings:
     converged: bool
     miss: float
     half_width: float
+    sides: str
     outside: int
     scores: int
     off: float
@@ -164,7 +166,7 @@ def reasons_of(findings: Findings, reasons: list[Reason]) -> list[str]:
         f"The fit settled, and the simulation meets the recording: {_met(findings)}.",
         f"Launches stretch the band to {findings.stretch:.2f} times its length, within the recorded"
         f" {findings.recorded_stretch:.2f}.",
-        f"Landings are known to ±{100 * findings.half_width:.0f} cm or better.",
+        f"Landings are known to {findings.sides} cm or better.",
     ]
     if findings.scores:
         notes.append(inside(findings))
@@ -310,7 +312,7 @@ def _launches(findings: Findings):
     elif findings.half_width > WIDE:
         yield Reason(
             findings.half_width > HALF_AREA,
-            f"Landings are known to ±{100 * findings.half_width:.0f} cm only.",
+            f"Landings are known to {findings.sides} cm only.",
         )
 
 

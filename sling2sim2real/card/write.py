@@ -16,7 +16,6 @@ from sling2sim2real.card.inputs import CardInputs
 from sling2sim2real.card.simulated import simulate
 from sling2sim2real.card.text import card_text
 from sling2sim2real.drawing.page import page
-from sling2sim2real.identification.results.ranges import searched
 
 SIZES = "mass", "diameter", "rest_length"  # kg, m, m
 
@@ -38,7 +37,6 @@ def write(to: Path, inputs: CardInputs, pictures: Pictures, digest: str | None =
     with replacing_folder(to) as folder:
         figures.camera(folder / "camera.webp", episode, simulated, pictures)
         figures.force(folder / "force.png", episode, simulated)
-        figures.values(folder / "values.png", concluded.values, searched(params, inputs.method))
         figures.landings(folder / "landings.png", inputs)
         animate(folder / "animation.webp", episode, simulated, pictures, params.setup.fork_width)
         write_text(folder / "README.md", card_text(inputs, concluded))
@@ -58,10 +56,12 @@ def content(inputs: CardInputs, concluded: Conclusion) -> dict:
             "draw_z_m": _rounded(draw[1], 4),
             "predicted_landing_m": _rounded(landing, 3),
             "interval_90_m": _ends(ends),
+            "median_landing_m": _rounded(median, 3),
             "hold_force_n": _rounded(force, 2),
         }
-        for target, draw, landing, ends, force in zip(
-            aims.target.tolist(), aims.draw, aims.landing, aims.interval, aims.hold_force,
+        for target, draw, landing, ends, median, force in zip(
+            aims.target.tolist(), aims.draw, aims.landing, aims.interval, aims.median,
+            aims.hold_force,
             strict=True,
         )
     ]  # fmt: skip

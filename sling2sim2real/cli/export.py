@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sling2sim2real.exporting.card import HOLD, LANDING
+from sling2sim2real.exporting.match import HOLD_LIMIT, LANDING_LIMIT
 
 
 def shown(folder: Path, content: dict) -> str:
@@ -19,6 +19,7 @@ def shown(folder: Path, content: dict) -> str:
     if "proof" in content:
         lines.append(
             f"{content['engine']}, draws that took no part in the match: asked"
-            f" {100 * HOLD:g} and {100 * LANDING:g} %, " + ("met" if content["met"] else "NOT met")
+            f" {100 * HOLD_LIMIT:g} and {100 * LANDING_LIMIT:g} %, "
+            + ("met" if content["met"] else "NOT met")
         )
     return "\n".join(lines)

@@ -11,15 +11,15 @@ from sling2sim2real.base.template import filled
 from sling2sim2real.exporting import values as export_values
 from sling2sim2real.exporting.band import CalibratedBand
 from sling2sim2real.exporting.chain import MATCHED
-from sling2sim2real.exporting.match import HOLD, LANDING, DrawCompared
+from sling2sim2real.exporting.match import HOLD_LIMIT, LANDING_LIMIT, DrawCompared
 from sling2sim2real.exporting.proof import Matched
 from sling2sim2real.exporting.states import state_changes
 from sling2sim2real.quantities import QUANTITIES, rounded
 
 UNITS = {"hold_force": "n", "speed": "m_s", "landing": "m"}  # in names of keys
 ASKED = (
-    f"On three draws that took no part in the match: hold force within {100 * HOLD:g} %, landing"
-    f" within {100 * LANDING:g} % of the calibrated simulation."
+    f"On three draws that took no part in the match: hold force within {100 * HOLD_LIMIT:g} %,"
+    f" landing within {100 * LANDING_LIMIT:g} % of the calibrated simulation."
 )
 
 

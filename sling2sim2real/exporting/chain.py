@@ -20,11 +20,12 @@ from sling2sim2real.simulator.initial import hanging_line
 from sling2sim2real.simulator.model import GRAVITY
 from sling2sim2real.simulator.rubber import uniaxial
 
-EDGES = 20
-STEPS = (5e-4, 2.5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)  # s, of time
-STABLE = 1.2  # of 2: h^2 w^2 / 2 + h g of the fastest mode, where explicit steps begin to grow
+CHAIN_EDGES = 20
+TIME_STEPS_S = (5e-4, 2.5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)  # s, of time
+# Of 2: h^2 w^2 / 2 + h g of the fastest mode, where explicit steps begin to grow.
+STABILITY_LIMIT = 1.2
 MATCHED = {"strength": "N", "mooney_share": "", "damping_time": "s"}  # what a match finds; units
-KNEE = 0.25  # of the largest strain: from there on a second spring helps the first
+KNEE_OF_STRAIN = 0.25  # of the largest strain: from there on a second spring helps the first
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class SpringChain:
         tension, stretch = cls.tension(model, draws, hold_force)
         share, upturn = theta.get("mooney_share", 0.0), theta.get("upturn", 0.0)
         chain = cls(
-            edges=EDGES,
+            edges=CHAIN_EDGES,
             rest_length=band.rest_length,
             mass=band.mass,
             half_width=setup.fork_width / 2,
@@ -79,7 +80,7 @@ class SpringChain:
             upturn=upturn,
             damping_time=theta["elasticity_damping"],
             largest_strain=float(stretch.max() - 1),
-            step=STEPS[-1],
+            step=TIME_STEPS_S[-1],
         )
         return replace(chain, step=chain.stable_step)
 
@@ -125,17 +126,17 @@ class SpringChain:
 
     @property
     def stable_step(self) -> float:
-        """The largest of STEPS with which explicit steps are stable. Raises UserError."""
+        """The largest of TIME_STEPS_S with which explicit steps are stable. Raises UserError."""
         fastest = self._fastest
-        for step in STEPS:
-            if step * fastest * (step / 2 + self.damping_time) <= STABLE:
+        for step in TIME_STEPS_S:
+            if step * fastest * (step / 2 + self.damping_time) <= STABILITY_LIMIT:
                 return step
-        raise UserError(f"a chain of this band needs time steps below {STEPS[-1]:g} s")
+        raise UserError(f"a chain of this band needs time steps below {TIME_STEPS_S[-1]:g} s")
 
     @property
     def most_damping(self) -> float:
         """Damping time with which its time step is just stable [s]."""
-        return 1.5 * STABLE / (self.step * self._fastest) - self.step / 2
+        return 1.5 * STABILITY_LIMIT / (self.step * self._fastest) - self.step / 2
 
     @property
     def _fastest(self) -> float:
@@ -151,12 +152,12 @@ class SpringChain:
             Coefficients of lengthening, its square and cube [N/m, N/m^2, N/m^3] of the first (3,)
             and the second (3,), strain of the knee, largest relative error of their pull.
         """
-        knee, rest = KNEE * self.largest_strain, self.spring_length
+        knee, rest = KNEE_OF_STRAIN * self.largest_strain, self.spring_length
         strain = np.linspace(0, self.largest_strain, 201)[1:]
         beyond = np.maximum(strain - knee, 0)
         powers = np.stack([strain, strain**2, strain**3, beyond**2, beyond**3], axis=1)
         pull = self.pull(strain)
-        weights = 1 / np.maximum(pull, self.pull(KNEE * knee))[:, None]
+        weights = 1 / np.maximum(pull, self.pull(KNEE_OF_STRAIN * knee))[:, None]
         factors = np.linalg.lstsq(weights * powers, weights[:, 0] * pull, rcond=None)[0]
         error = np.abs(weights[:, 0] * (powers @ factors - pull)).max()
         first, second = factors[:3], np.array([0.0, *factors[3:]])

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from inspect import getfile
 from pathlib import Path
 
 import numpy as np
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import replacing_folder, write_json, write_text
+from sling2sim2real.base.machine import devices
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.exporting import ENGINES, card, mjcf, newton_file, usd
+from sling2sim2real.exporting import ENGINES, card, mjcf, newton_replay, usd
 from sling2sim2real.exporting.band import CalibratedBand
 from sling2sim2real.exporting.chain import SpringChain
 from sling2sim2real.exporting.match import matched, proof_draws
 from sling2sim2real.exporting.mujoco_replay import MujocoBand
-from sling2sim2real.exporting.proof import proven
+from sling2sim2real.exporting.proof import Matched, proven
 
 
 def write(model: CalibratedBand, to: str, folder: Path, episode: Episode | None = None) -> dict:
@@ -50,13 +52,43 @@ def replaceable(folder: Path) -> bool:
 
 def to_mjcf(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
     """The chain of mjcf.py, proven by a replay of the written file."""
-    name, chain = model.band.name, matched(model)
-    path, proof = folder / f"{name}.xml", proof_draws(model)
+    name, chain, proof = model.band.name, matched(model), proof_draws(model)
+    path = folder / f"{name}.xml"
     write_text(path, mjcf.text(name, chain, _keys(chain, proof)))
     done = proven(model, MujocoBand(chain, path), proof, episode)
-    files = {path.name: "the model", "README.md": "how to use it, and what came out"}
-    content = card.content(model, done, "mjcf", files)
-    write_text(folder / "README.md", card.readme(content, version=mjcf.VERSION))
+    return _chain_card(model, folder, "mjcf", done, {path.name: "the model"}, mjcf.VERSION)
+
+
+def to_newton(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
+    """<band>.json and newton_band.py, proven by a replay on the first device of SLING_DEVICE.
+
+    The chain is matched in MuJoCo, which steps the same springs the same way. All that is said
+    about it is measured in Newton.
+    """
+    source = Path(getfile(newton_replay.loader()))
+    name, chain, proof = model.band.name, matched(model), proof_draws(model)
+    path = folder / f"{name}.json"
+    write_json(path, newton_replay.numbers(name, chain, proof))
+    write_text(folder / source.name, source.read_text("utf-8"))
+    done = proven(model, newton_replay.NewtonReplay(chain, devices()[0]), proof, episode)
+    files = {path.name: "the numbers", source.name: "builds and launches the band"}
+    return _chain_card(model, folder, "newton", done, files)
+
+
+def _chain_card(
+    model: CalibratedBand,
+    folder: Path,
+    target: str,
+    done: Matched,
+    files: dict[str, str],
+    version: str | None = None,
+) -> dict:
+    """What card.json holds of a proven chain; writes README.md."""
+    files = files | {"README.md": "how to use it, and what came out"}
+    content = card.content(model, done, target, files)
+    if target == "newton":
+        del content["springs_error"]  # the kernel has the law itself
+    write_text(folder / "README.md", card.readme(content, version=version))
     return content
 
 
@@ -72,6 +104,4 @@ def _keys(chain: SpringChain, proof: np.ndarray) -> dict[str, dict[str, np.ndarr
 
 
 Target = Callable[[CalibratedBand, Path, Episode | None], dict]
-TARGETS: dict[str, Target] = dict(
-    zip(ENGINES, (to_mjcf, newton_file.to_newton, usd.to_usd), strict=True)
-)
+TARGETS: dict[str, Target] = dict(zip(ENGINES, (to_mjcf, to_newton, usd.to_usd), strict=True))

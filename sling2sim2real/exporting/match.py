@@ -15,15 +15,15 @@ from sling2sim2real.exporting.mujoco_replay import MujocoBand
 from sling2sim2real.exporting.replay import Shot
 from sling2sim2real.simulator.launch import Launches
 
-GRID = 5  # draws along y and z over the box
-AROUND = 1.6  # times nearer and farther than policy.targets: where launches are matched
-LEAST = 4  # of them that must land
-DEPTHS = (0.15, 0.35, 0.55)  # of the box along y, for the proof: none is on the grid
-FINE = 41  # places along z for it
-LOST = 1.0  # relative error of a launch that nothing leaves
-HOLD, LANDING = 0.02, 0.03  # relative errors that weigh as much as each other: what is asked
-STRONGER, SHARE = 0.4, 0.6  # how far a match may go from its guess: logarithm, difference
-TURNS = 12  # of the search, at most
+DRAWS_A_SIDE = 5  # draws along y and z over the box
+TARGET_MARGIN = 1.6  # times nearer and farther than policy.targets: where launches are matched
+FEWEST_DRAWS = 4  # of them that must land
+PROOF_DEPTHS = (0.15, 0.35, 0.55)  # of the box along y, for the proof: none is on the grid
+PROOF_PLACES = 41  # places along z for it
+LOST_LAUNCH_ERROR = 1.0  # relative error of a launch that nothing leaves
+HOLD_LIMIT, LANDING_LIMIT = 0.02, 0.03  # relative errors that weigh alike: what is asked
+STRENGTH_REACH, MOONEY_REACH = 0.4, 0.6  # from the guess of a match: logarithm, difference
+MOST_EVALUATIONS = 12  # of the search, at most
 
 
 @dataclass(frozen=True)
@@ -48,24 +48,25 @@ def draws_of(model: CalibratedBand) -> tuple[np.ndarray, Launches]:
     Those that the arm may hold. Raises UserError where there are too few.
     """
     setup, (near, far) = model.settings.setup, model.settings.policy.targets
-    axes = [np.linspace(*box, GRID) for box in (setup.draw_y, setup.draw_z)]
+    axes = [np.linspace(*box, DRAWS_A_SIDE) for box in (setup.draw_y, setup.draw_z)]
     draws = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     done = model.launches(draws)
     with np.errstate(invalid="ignore"):
-        good = (done.landing_y > near / AROUND) & (done.landing_y < far * AROUND)
+        good = (done.landing_y > near / TARGET_MARGIN) & (done.landing_y < far * TARGET_MARGIN)
         good &= done.hold_force <= setup.max_force
-    if good.sum() < LEAST:
+    if good.sum() < FEWEST_DRAWS:
         raise UserError(
             f"{model.band.name}: {good.sum()} of {len(draws)} draws of the box (setup.draw_y, "
-            f"draw_z) land near policy.targets within setup.max_force; a match needs {LEAST}"
+            f"draw_z) land near policy.targets within setup.max_force; a match needs {FEWEST_DRAWS}"
         )
     return draws[good], done[good]
 
 
 def within_limits(proof: Sequence[DrawCompared]) -> bool:
-    """Whether each draw is held and lands as near as is asked: HOLD, LANDING."""
+    """Whether each draw is held and lands as near as is asked: HOLD_LIMIT, LANDING_LIMIT."""
     return all(
-        abs(draw.errors["hold_force"]) <= HOLD and abs(draw.errors["landing"]) <= LANDING
+        abs(draw.errors["hold_force"]) <= HOLD_LIMIT
+        and abs(draw.errors["landing"]) <= LANDING_LIMIT
         for draw in proof
     )
 
@@ -113,16 +114,24 @@ def _fitted(start: SpringChain, draws: np.ndarray, ours: Launches) -> SpringChai
         chain = chain_at(point)
         shots = MujocoBand(chain).launches(draws)
         both = [
-            [(shot.hold_force / hold - 1) / HOLD, (shot.landing / landing - 1) / LANDING]
+            [
+                (shot.hold_force / hold - 1) / HOLD_LIMIT,
+                (shot.landing / landing - 1) / LANDING_LIMIT,
+            ]
             for shot, hold, landing in zip(shots, ours.hold_force, ours.landing_y, strict=True)
         ]
-        return np.nan_to_num(np.ravel(both), nan=LOST / LANDING)
+        return np.nan_to_num(np.ravel(both), nan=LOST_LAUNCH_ERROR / LANDING_LIMIT)
 
     most = start.most_damping / start.damping_time
-    limits = np.array([[-STRONGER, -SHARE, -np.log(20)], [STRONGER, SHARE, np.log(most)]])
+    limits = np.array(
+        [
+            [-STRENGTH_REACH, -MOONEY_REACH, -np.log(20)],
+            [STRENGTH_REACH, MOONEY_REACH, np.log(most)],
+        ]
+    )
     solution = least_squares(
         errors, np.ones(len(MATCHED)), bounds=1 + limits,  # about 1: steps are relative
-        diff_step=1e-2, x_scale=[0.1, 0.1, 1.0], xtol=1e-5, ftol=1e-6, max_nfev=TURNS,
+        diff_step=1e-2, x_scale=[0.1, 0.1, 1.0], xtol=1e-5, ftol=1e-6, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
     return chain_at(solution.x)
 
@@ -133,13 +142,13 @@ def proof_draws(model: CalibratedBand) -> np.ndarray:
     The farther the target, the farther from the fork along y; along z what lands nearest.
     """
     setup, targets = model.settings.setup, model.settings.trials.targets
-    wanted = np.linspace(min(targets), max(targets), len(DEPTHS))
+    wanted = np.linspace(min(targets), max(targets), len(PROOF_DEPTHS))
     far, near = sorted(setup.draw_y)
     low, high = sorted(setup.draw_z)
-    across = np.linspace(low, high, FINE)
+    across = np.linspace(low, high, PROOF_PLACES)
     nearest = []
-    for target, depth in zip(wanted, DEPTHS, strict=True):
-        draws = np.column_stack([np.full(FINE, near + depth * (far - near)), across])
+    for target, depth in zip(wanted, PROOF_DEPTHS, strict=True):
+        draws = np.column_stack([np.full(PROOF_PLACES, near + depth * (far - near)), across])
         miss = np.abs(model.launches(draws).landing_y - target)
         if np.isnan(miss).all():
             raise UserError(

@@ -12,7 +12,7 @@ from sling2sim2real.simulator.initial import fixed_frames, hanging_line
 from sling2sim2real.simulator.interaction import blend
 from sling2sim2real.simulator.model import ClampedBand
 
-CLAMPED = 0.015  # m of band in each clamp
+CLAMPED_LENGTH_M = 0.015  # m of band in each clamp
 EDGES, GRADING = 48, 6.0  # 50 intervals with those in the clamps: 900 tetrahedra
 
 
@@ -52,7 +52,7 @@ class Tube:
         """
         steps = sling.steps.model_copy(update={"grading": grading})
         arc = replace(sling, edges=edges, steps=steps).arc
-        whole = np.concatenate([[-CLAMPED], arc, [sling.rest_length + CLAMPED]])
+        whole = np.concatenate([[-CLAMPED_LENGTH_M], arc, [sling.rest_length + CLAMPED_LENGTH_M]])
         rest, tetrahedra = cylinder(whole, 2 * sling.radius, rings)
         share = np.repeat(volumes(rest, tetrahedra) / 4, 4)
         density = sling.mass / (sling.area * sling.rest_length)

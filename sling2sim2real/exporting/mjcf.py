@@ -11,9 +11,9 @@ from sling2sim2real.exporting.chain import SpringChain
 from sling2sim2real.simulator.model import GRAVITY
 
 VERSION = "3.7"  # of MuJoCo: the first whose springs may be cubic
-HAND_MASS = 1.0  # kg
-STIFF = 1e6  # N/m: of a hand that does not give way
-BALL = 0.02  # m: radius of the projectile's picture
+HAND_MASS_KG = 1.0  # kg
+RIGID_HAND_N_PER_M = 1e6  # N/m: of a hand that does not give way
+BALL_RADIUS_M = 0.02  # m: radius of the projectile's picture
 AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 
 
@@ -40,8 +40,8 @@ def text(name: str, chain: SpringChain, keys: Mapping[str, Mapping] | None = Non
     for label, other in (("hold", "hand"), ("pouch", "projectile")):
         xml.SubElement(holds, "connect", name=label, site1=other, site2=middle)
     actuators, sensors = xml.SubElement(root, "actuator"), xml.SubElement(root, "sensor")
-    stiffness = _shown(chain.arm_stiffness or STIFF)
-    brake = _shown(2 * np.sqrt(float(stiffness) * HAND_MASS))
+    stiffness = _shown(chain.arm_stiffness or RIGID_HAND_N_PER_M)
+    brake = _shown(2 * np.sqrt(float(stiffness) * HAND_MASS_KG))
     for axis in AXES:
         label = f"hand_{axis}"
         xml.SubElement(actuators, "position", name=label, joint=label, kp=stiffness, kv=brake)
@@ -87,9 +87,9 @@ def _bodies(world: xml.Element, chain: SpringChain) -> None:
         xml.SubElement(body, "inertial", mass)
     middle = places[chain.edges // 2]
     hand = _moving(world, "hand", [0, 0, 0], gravcomp="1")
-    xml.SubElement(hand, "inertial", mass=_shown(HAND_MASS), pos="0 0 0", diaginertia="1 1 1")
+    xml.SubElement(hand, "inertial", mass=_shown(HAND_MASS_KG), pos="0 0 0", diaginertia="1 1 1")
     ball = _moving(world, "projectile", middle)
-    look = {"size": _shown(BALL), "rgba": "0.2 0.4 0.8 1"}
+    look = {"size": _shown(BALL_RADIUS_M), "rgba": "0.2 0.4 0.8 1"}
     xml.SubElement(ball, "geom", {"mass": _shown(chain.projectile_mass), **look})
 
 

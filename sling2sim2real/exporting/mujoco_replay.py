@@ -12,12 +12,12 @@ import numpy as np
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.exporting import mjcf
 from sling2sim2real.exporting.chain import SpringChain
-from sling2sim2real.exporting.mjcf import HAND_MASS, STIFF
-from sling2sim2real.exporting.replay import HANG, HandPath, Pulled, Shot
+from sling2sim2real.exporting.mjcf import HAND_MASS_KG, RIGID_HAND_N_PER_M
+from sling2sim2real.exporting.replay import HANG_S, HandPath, Pulled, Shot
 from sling2sim2real.simulator.launch import ballistic_landing
 
-SETTLE, BRAKE = 0.25, 250.0  # s and 1/s: how long and how a drawn band is brought to rest
-LONGEST = 0.5  # s from a release until nothing has left the pouch
+SETTLE_S, BRAKE_PER_S = 0.25, 250.0  # s and 1/s: how long and how a drawn band is brought to rest
+LONGEST_RECOIL_S = 0.5  # s from a release until nothing has left the pouch
 
 
 class MujocoBand:
@@ -62,14 +62,14 @@ class MujocoBand:
     def hang(self) -> None:
         """Let the band hang at rest, beside the hand."""
         self._put(self.chain.hanging(), False, pouch=True)
-        self._settle(HANG)
+        self._settle(HANG_S)
         place = self.line[self.chain.edges // 2]
         self.data.qpos[self._hand] = self.data.ctrl[:] = place
 
     def draw(self, draw) -> float:
         """Hold the band with the projectile at rest; the arm is sent to (y, z). Its force [N]."""
         self._put(self.chain.drawn(np.array([0.0, *draw])), True, pouch=True)
-        self._settle(SETTLE)
+        self._settle(SETTLE_S)
         return float(np.linalg.norm(self.force))
 
     @property
@@ -90,7 +90,7 @@ class MujocoBand:
         hold_force = self.draw(draw)
         forward = -np.array([0.0, *draw]) / np.linalg.norm(draw)
         self.data.eq_active[self._hold] = 0
-        for _ in range(round(LONGEST / self.chain.step)):
+        for _ in range(round(LONGEST_RECOIL_S / self.chain.step)):
             self._step(self.model, self.data)
             if self.data.qfrc_constraint[self._ball] @ forward <= 0:  # the pouch cannot pull
                 break
@@ -121,7 +121,7 @@ class MujocoBand:
     def pull(self, path: HandPath, times: np.ndarray, stamps: np.ndarray) -> Pulled:
         """Pull as ChainReplay.pull does."""
         self.hang()
-        gain, brake = STIFF, 2 * np.sqrt(STIFF * HAND_MASS)
+        gain, brake = RIGID_HAND_N_PER_M, 2 * np.sqrt(RIGID_HAND_N_PER_M * HAND_MASS_KG)
         before = self.model.actuator_gainprm.copy(), self.model.actuator_biasprm.copy()
         self.model.actuator_gainprm[:, 0] = gain
         self.model.actuator_biasprm[:, 1:3] = -gain, -brake
@@ -150,7 +150,7 @@ class MujocoBand:
     def _settle(self, duration: float) -> None:
         """Brake all motion for a while."""
         dofs = np.r_[self._nodes, self._ball]
-        self.model.dof_damping[dofs] = BRAKE * self.model.dof_M0[dofs]
+        self.model.dof_damping[dofs] = BRAKE_PER_S * self.model.dof_M0[dofs]
         self._step(self.model, self.data, nstep=round(duration / self.chain.step))
         self.model.dof_damping[dofs] = 0
         self.data.qvel[:] = 0

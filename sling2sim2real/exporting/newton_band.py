@@ -26,11 +26,11 @@ import warp as wp
 # pyright: reportInvalidTypeForm=false, reportGeneralTypeIssues=false
 
 GRAVITY = 9.81  # m/s^2
-HAND_MASS = 1.0  # kg
-STIFF = 1e6  # N/m: of a hand that does not give way
-SETTLE, BRAKE = 0.25, 250.0  # s and 1/s: how long and how a drawn band is brought to rest
-LONGEST = 0.5  # s from a release until nothing has left the pouch
-LOOK = 50  # steps, an even number, between two looks at what has left and landed
+HAND_MASS_KG = 1.0  # kg
+RIGID_HAND_N_PER_M = 1e6  # N/m: of a hand that does not give way
+SETTLE_S, BRAKE_PER_S = 0.25, 250.0  # s and 1/s: how long and how a drawn band is brought to rest
+LONGEST_RECOIL_S = 0.5  # s from a release until nothing has left the pouch
+STEPS_BETWEEN_LOOKS = 50  # steps, an even number, between two looks at what has left and landed
 
 
 @wp.struct
@@ -157,8 +157,8 @@ class SpringBands:
         n.strength = numbers_known["strength_n"]
         n.share, n.upturn = numbers_known["mooney_share"], numbers_known["upturn"]
         n.damping = numbers_known["damping_time_s"]
-        self.arm_stiffness = numbers_known["arm_stiffness_n_per_m"] or STIFF
-        n.hand_mass, n.gravity = HAND_MASS, GRAVITY
+        self.arm_stiffness = numbers_known["arm_stiffness_n_per_m"] or RIGID_HAND_N_PER_M
+        n.hand_mass, n.gravity = HAND_MASS_KG, GRAVITY
         half = numbers_known["half_width_m"]
         self.tips = np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
 
@@ -189,7 +189,7 @@ class SpringBands:
     def drive(self, stiffness: float) -> None:
         """How stiff the hand's drive is [N/m]."""
         self._n.stiffness = stiffness
-        self._n.hand_damping = 2 * np.sqrt(stiffness * HAND_MASS)
+        self._n.hand_damping = 2 * np.sqrt(stiffness * HAND_MASS_KG)
 
     def draw(self, draws) -> np.ndarray:
         """Hold the bands with projectiles, at rest; hands are sent to (y, z), `draws` (N, 2).
@@ -201,7 +201,7 @@ class SpringBands:
         self.put([straight(self.tips, place, self._n.edges) for place in places])
         self.lead(places)
         self._forward.assign(-places / np.linalg.norm(places, axis=1, keepdims=True))
-        self.settle(SETTLE)
+        self.settle(SETTLE_S)
         return np.linalg.norm(self.force, axis=1)
 
     def launch(self) -> tuple[np.ndarray, np.ndarray]:
@@ -212,9 +212,10 @@ class SpringBands:
             and (N, 3); NaN where nothing leaves.
         """
         self._held.zero_()
-        self._until(lambda: not self._loaded.numpy().any(), LONGEST)
+        self._until(lambda: not self._loaded.numpy().any(), LONGEST_RECOIL_S)
         flying = self._loaded.numpy() == 0
-        self._until(lambda: not np.isnan(self._landing.numpy()[flying]).any(), 10 * LONGEST)
+        longest = 10 * LONGEST_RECOIL_S
+        self._until(lambda: not np.isnan(self._landing.numpy()[flying]).any(), longest)
         left = np.where(flying[:, None], self._left.numpy(), np.nan)
         return self._landing.numpy().astype(float), left.astype(float)
 
@@ -235,7 +236,7 @@ class SpringBands:
 
     def settle(self, duration: float) -> None:
         """Brake all motion for a while."""
-        self._brake.fill_(BRAKE)
+        self._brake.fill_(BRAKE_PER_S)
         self.run(round(duration / self.step_size / 2) * 2)
         self._brake.zero_()
         for state in self.states:
@@ -259,10 +260,10 @@ class SpringBands:
             self.advance(after, now)
 
     def _until(self, done, longest: float) -> None:
-        for _ in range(int(longest / self.step_size / LOOK) + 1):
+        for _ in range(int(longest / self.step_size / STEPS_BETWEEN_LOOKS) + 1):
             if done():
                 return
-            self.run(LOOK)
+            self.run(STEPS_BETWEEN_LOOKS)
 
     def advance(self, now: newton.State, after: newton.State) -> None:
         """One step."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.exporting.chain import SpringChain
-from sling2sim2real.exporting.replay import HANG, HandPath, Pulled, Shot
+from sling2sim2real.exporting.replay import HANG_S, HandPath, Pulled, Shot
 
 
 def numbers(name: str, chain: SpringChain, draws: np.ndarray) -> dict:
@@ -66,9 +66,9 @@ class NewtonReplay:
         bands = self._module.SpringBands(self._numbers, device=self.device)
         middle = self.chain.edges // 2
         bands.put([self.chain.hanging()], held=False)
-        bands.settle(HANG)
+        bands.settle(HANG_S)
         bands.put(bands.lines, loaded=False)
-        bands.drive(self._module.STIFF)
+        bands.drive(self._module.RIGID_HAND_N_PER_M)
         looks = np.searchsorted(times, stamps)
         force, lines = np.empty((len(times), 3)), []
         now, after = bands.states

@@ -10,7 +10,7 @@ import numpy as np
 
 from sling2sim2real.exporting.chain import SpringChain
 
-HANG = 3.0  # s for the slack band
+HANG_S = 3.0  # s for the slack band
 HandPath = Callable[[np.ndarray], np.ndarray]  # places of the hand (S, 3) from its first, (3,)
 
 

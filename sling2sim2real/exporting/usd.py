@@ -8,7 +8,7 @@ each tetrahedron,
 with Lame's mu and lam and the rotation R in F. It is stiffer than rubber when stretched, so that
 Young's modulus is scaled until a straight string of it holds as the calibrated simulation does.
 Where PhysX is at hand, modulus, mass, rest length and the clamps' height are then matched in it
-(GROUP).
+(ENTRY_POINTS).
 
 The stage opens with the straight band at rest: a volume whose `points` are bent while it is opened
 collapses across in PhysX (reports/validation/export-usd-causes.json), and holds too little. So the
@@ -18,7 +18,7 @@ ends are nodes to be led, not attachments; nodes.json says which, and where.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import entry_points
@@ -39,13 +39,13 @@ from sling2sim2real.quantities import rounded
 from sling2sim2real.simulator.launch import Launches
 from sling2sim2real.simulator.model import GRAVITY
 
-RATE, ITERATIONS = 200, 64  # steps a second, of the solver: the paper's
+STEPS_PER_S, SOLVER_ITERATIONS = 200, 64  # steps a second, of the solver: the paper's
 EDGES, GRADING = 52, 1.0  # between the clamps: 18 tetrahedra each
-NEAR = 1.2  # times nearer and farther than policy.targets: landings that are matched
+TARGET_MARGIN = 1.2  # times nearer and farther than policy.targets: landings that are matched
 # What stages that are matched on paper alone leave in PhysX, least and most over three virtual
 # bands and three draws each: reports/validation/export-usd.json.
 ON_PAPER = {"hold_force": (0.02, 0.16), "landing": (0.01, 0.21)}
-GROUP = "sling2sim2real.matches"  # of entry points: functions that match an export in its engine
+ENTRY_POINTS = "sling2sim2real.matches"  # functions that match an export in its engine
 
 
 @dataclass(frozen=True)
@@ -142,8 +142,8 @@ def to_usd(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict
         "factor_on_rest_length": rounded(band.rest_length / start.rest_length, 4),
         "tension_errors": [rounded(float(error)) for error in left],
         "stretches": [rounded(float(value), 4) for value in stretch],
-        "time_step_s": 1 / RATE,
-        "iterations": ITERATIONS,
+        "time_step_s": 1 / STEPS_PER_S,
+        "iterations": SOLVER_ITERATIONS,
         "tetrahedra": len(tube.tetrahedra),
     }
     if done:
@@ -162,14 +162,14 @@ def to_usd(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict
 def near_draws(model: CalibratedBand) -> tuple[np.ndarray, Launches]:
     """What `draws_of` gives, near policy.targets alone; all where that is too few."""
     (draws, ours), (near, far) = draws_of(model), model.settings.policy.targets
-    good = (ours.landing_y > near / NEAR) & (ours.landing_y < far * NEAR)
+    good = (ours.landing_y > near / TARGET_MARGIN) & (ours.landing_y < far * TARGET_MARGIN)
     return (draws[good], ours[good]) if good.sum() > 2 else (draws, ours)
 
 
 def match_of(target: str) -> Callable[[CalibratedBand, UsdBand], UsdMatch | None] | None:
     """What an installed package offers to match a target in its engine; None: nothing."""
     with suppress(ModuleNotFoundError):  # a light install lacks what the engine's side needs
-        for entry in entry_points(group=GROUP, name=target):
+        for entry in entry_points(group=ENTRY_POINTS, name=target):
             return imported(entry.value)
     return None
 
@@ -200,21 +200,25 @@ def nominal(stretch: np.ndarray, poisson: float) -> np.ndarray:
 
 
 def text(band: UsdBand) -> str:
-    """The stage: scene, material, the straight band."""
-    rest = band.tube.rest
-    return STAGE % {
-        "gravity": GRAVITY,
-        "rate": RATE,
-        "iterations": ITERATIONS,
-        "young": band.young,
-        "poisson": band.poisson,
-        "friction": band.friction,
-        "mass": band.mass,
+    """The exported stage: scene, material, the straight band."""
+    values = {name: getattr(band, name) for name in ("young", "poisson", "friction")}
+    named = {"material": "Rubber", "name": "Band", "place": ""}
+    return stage(band.tube, [{**values, **named, "damping": 0.0}])
+
+
+def stage(tube: Tube, bands: Iterable[Mapping[str, object]]) -> str:
+    """A stage of equal straight bands: for each what BAND names and the mesh does not have."""
+    rest = tube.rest
+    mesh = {
+        "iterations": SOLVER_ITERATIONS,
+        "mass": tube.mass.sum(),
         "rest": _tuples(rest.reshape(-1, 3)),
-        "tetrahedra": _tuples(band.tube.tetrahedra),
-        "faces": _tuples(surface(band.tube.tetrahedra)),
+        "tetrahedra": _tuples(tube.tetrahedra),
+        "faces": _tuples(surface(tube.tetrahedra)),
         "extent": _tuples(np.stack([rest.min((0, 1)), rest.max((0, 1))])),
     }
+    head = SCENE % {"gravity": GRAVITY, "rate": STEPS_PER_S}
+    return head + "".join(BAND % {**mesh, **band} for band in bands) + "}\n"
 
 
 def surface(tetrahedra: np.ndarray) -> np.ndarray:
@@ -231,7 +235,7 @@ def _tuples(rows: np.ndarray) -> str:
     return "[" + ", ".join(f"({', '.join(format(v, form) for v in row)})" for row in shown) + "]"
 
 
-STAGE = """#usda 1.0
+SCENE = """#usda 1.0
 (
     defaultPrim = "World"
     kilogramsPerUnit = 1
@@ -250,17 +254,18 @@ def Xform "World"
         token physxScene:solverType = "TGS"
         uint physxScene:timeStepsPerSecond = %(rate)d
     }
-
-    def Material "Rubber" (prepend apiSchemas = ["PhysicsMaterialAPI",
+"""
+BAND = """
+    def Material "%(material)s" (prepend apiSchemas = ["PhysicsMaterialAPI",
         "OmniPhysicsDeformableMaterialAPI", "PhysxDeformableMaterialAPI"])
     {
         float omniphysics:dynamicFriction = %(friction).9g
         float omniphysics:poissonsRatio = %(poisson).9g
         float omniphysics:youngsModulus = %(young).9g
-        float physxDeformableMaterial:elasticityDamping = 0
+        float physxDeformableMaterial:elasticityDamping = %(damping).9g
     }
 
-    def TetMesh "Band" (prepend apiSchemas = ["OmniPhysicsDeformableBodyAPI",
+    def TetMesh "%(name)s" (prepend apiSchemas = ["OmniPhysicsDeformableBodyAPI",
         "OmniPhysicsVolumeDeformableSimAPI", "OmniPhysicsDeformablePoseAPI:default",
         "PhysicsCollisionAPI", "MaterialBindingAPI", "PhysxBaseDeformableBodyAPI"])
     {
@@ -274,12 +279,11 @@ def Xform "World"
         float3[] extent = %(extent)s
         point3f[] omniphysics:restShapePoints = %(rest)s
         int4[] omniphysics:restTetVtxIndices = %(tetrahedra)s
-        rel material:binding:physics = </World/Rubber> (
+        rel material:binding:physics = </World/%(material)s> (
             bindMaterialAs = "weakerThanDescendants"
         )
         point3f[] points = %(rest)s
         int3[] surfaceFaceVertexIndices = %(faces)s
         int4[] tetVertexIndices = %(tetrahedra)s
-    }
-}
+%(place)s    }
 """

@@ -27,8 +27,9 @@ FAILURES = {
     Outcome.SLIPPED: "the band slipped out of the fingers",
 }
 FRICTION = 0.8  # of the pads, whose opening time the fall of the force tells
-BOW, GRID, AROUND = 5e-6, 1e-3, 0.03  # m, s, s: of the steps while the hand holds
-GRASP_BLEND = 0.5  # s in which the held node moves from where the band hung to the hand's path
+# Of the steps while the hand holds.
+LARGEST_BOW_M, BEND_GRID_S, BEND_WINDOW_S = 5e-6, 1e-3, 0.03
+GRASP_BLEND_S = 0.5  # s in which the held node moves from where the band hung to the hand's path
 
 
 @dataclass(frozen=True)
@@ -115,16 +116,18 @@ def schedule_of(sling: ClampedBand, episode: Episode, refine: int = 1) -> Schedu
 def _held_times(hand: CubicSpline, episode: Episode, size, refine: int) -> np.ndarray:
     """Ends of the steps from grasp to release [s]: as long as the hand goes nearly straight.
 
-    A step of h bows from its chord by h^2 |a| / 8, which is at most BOW, and a band that the hand
+    A step of h bows from its chord by h^2 |a| / 8, at most LARGEST_BOW_M, and a band that the hand
     holds follows it. Between `grip_step` and `hold_step`.
     """
     from scipy.ndimage import maximum_filter1d
 
-    time = np.arange(episode.grasp_time, episode.release_time, GRID)
+    time = np.arange(episode.grasp_time, episode.release_time, BEND_GRID_S)
     bend = np.linalg.norm(hand(_within(time, episode), 2), axis=1)
-    bend = maximum_filter1d(bend, 2 * round(AROUND / GRID) + 1)
-    longest = np.sqrt(8 * BOW / np.maximum(bend, 1e-9)).clip(size.grip_step, size.hold_step)
-    longest[time < episode.grasp_time + GRASP_BLEND] = size.grip_step
+    bend = maximum_filter1d(bend, 2 * round(BEND_WINDOW_S / BEND_GRID_S) + 1)
+    longest = np.sqrt(8 * LARGEST_BOW_M / np.maximum(bend, 1e-9)).clip(
+        size.grip_step, size.hold_step
+    )
+    longest[time < episode.grasp_time + GRASP_BLEND_S] = size.grip_step
     done = np.append(0.0, np.cumsum(np.diff(time, append=episode.release_time) / longest))
     count = max(int(np.ceil(done[-1] * refine - 1e-9)), 1)
     return np.interp(
@@ -148,7 +151,7 @@ def _lead(rows: np.ndarray, hand: CubicSpline, sling: ClampedBand, episode: Epis
 
 def blend(time: np.ndarray, episode: Episode) -> np.ndarray:
     """What share is left, at times (T,), of the way from the grasp to the hand's path."""
-    return 1 - minimum_jerk((time - episode.grasp_time) / GRASP_BLEND)
+    return 1 - minimum_jerk((time - episode.grasp_time) / GRASP_BLEND_S)
 
 
 def interact(

@@ -14,14 +14,14 @@ from sling2sim2real.simulator.initial import drawn_guess
 from sling2sim2real.simulator.model import GRAVITY, ClampedBand, LaunchHistory, LaunchSetup
 from sling2sim2real.simulator.parameters import Parameters
 from sling2sim2real.simulator.records import Grip, Outcome
-from sling2sim2real.simulator.rubber import RUBBER, TIMES, flowing, overstress, uniaxial
+from sling2sim2real.simulator.rubber import BRANCH_TIMES_S, RUBBER, flowing, overstress, uniaxial
 from sling2sim2real.simulator.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from sling2sim2real.simulator.solver import Options, Slings, run
 
-SHARE = 1024  # launches: a device more for fewer would only cost its start
+FEWEST_LAUNCHES_A_DEVICE = 1024  # launches: a device more for fewer would only cost its start
 HISTORY_STEPS = 200  # of a pull
-NUDGE = 1e-3  # m of a draw, small against its box and large against the simulator's rounding
-CROSS = NUDGE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
+NUDGE_M = 1e-3  # m of a draw, small against its box and large against the simulator's rounding
+CENTRAL_DIFFERENCES_M = NUDGE_M * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
 
 
 @dataclass(frozen=True)
@@ -88,13 +88,13 @@ def memory_of_pull(
     """
     count = len(draws)
     if band.law != RUBBER or history is None:
-        return {"unrelaxed": np.zeros((count, len(TIMES))), "unflowed": np.zeros(count)}
+        return {"unrelaxed": np.zeros((count, len(BRANCH_TIMES_S))), "unflowed": np.zeros(count)}
     part = np.linspace(0, 1, HISTORY_STEPS + 1)
     drawn = np.linalg.norm(draws, axis=1)[:, None] * (part**2 * (3 - 2 * part))
     shape = (parameters.column(name)[:, None] for name in ("mooney_share", "upturn"))
     stress, step = uniaxial(band.drawn(drawn), *shape), history.pull_time / HISTORY_STEPS
     at_rest = np.maximum(stress[:, -1], 1e-9)
-    carried = overstress(stress, step) * np.exp(-history.pause / TIMES)
+    carried = overstress(stress, step) * np.exp(-history.pause / BRANCH_TIMES_S)
     rate = 10 ** parameters.column("log_flow_rate")
     return {
         "unrelaxed": carried / at_rest[:, None],
@@ -140,7 +140,9 @@ def launch(
         options = Options(place, workers, launching=True, double=double)
         return run(band, schedule, slings[share], options=options).lanes
 
-    devices = [device] if isinstance(device, str) else device[: max(count // SHARE, 1)]
+    devices = (
+        [device] if isinstance(device, str) else device[: max(count // FEWEST_LAUNCHES_A_DEVICE, 1)]
+    )
     shares = np.array_split(np.arange(count), len(devices))
     with ThreadPoolExecutor(len(devices)) as pool:
         lanes = np.concatenate(list(pool.map(launched_on, devices, shares)))
@@ -173,8 +175,10 @@ def landing_gradient(
     Args:
         land: Landings (M,) [m] of draws (M, 2) [m], NaN where one fails.
     """
-    landing = land((draws[:, None] + CROSS).reshape(-1, 2)).reshape(len(draws), len(CROSS))
-    return landing[:, 0], (landing[:, 1::2] - landing[:, 2::2]) / (2 * NUDGE)
+    landing = land((draws[:, None] + CENTRAL_DIFFERENCES_M).reshape(-1, 2)).reshape(
+        len(draws), len(CENTRAL_DIFFERENCES_M)
+    )
+    return landing[:, 0], (landing[:, 1::2] - landing[:, 2::2]) / (2 * NUDGE_M)
 
 
 def outcomes(

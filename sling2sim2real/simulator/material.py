@@ -15,7 +15,7 @@ from sling2sim2real.simulator.parameters import THETA, Parameters
 from sling2sim2real.simulator.records import MATERIAL
 from sling2sim2real.simulator.rubber import RUBBER, relaxed
 
-LEAST_SCALE = 0.0075  # without any damping of shape waves ring on for ever, and no step holds them
+LEAST_DAMPING_SCALE = 0.0075  # without damping of shape waves ring for ever: no step holds them
 
 
 def material(
@@ -25,8 +25,8 @@ def material(
 
     mu is the shear modulus and lam the volume modulus of the stable neo-Hookean law without its
     logarithm (Smith, de Goes, Kim 2018): first Lame parameter plus mu, so that E and nu are the
-    small-strain ones. `friction` is that of both pads. A damping_scale below LEAST_SCALE is taken
-    as that.
+    small-strain ones. `friction` is that of both pads. A damping_scale is at least
+    LEAST_DAMPING_SCALE.
 
     Args:
         rigidity: Flexural, one or one a sample [N m^2]; None: the band's.
@@ -49,7 +49,7 @@ def material(
         result["flow_rate"] = 10 ** parameters.column("log_flow_rate")
     result["mu"] = mu = young / (2 * (1 + poisson))
     result["lam"] = young * poisson / ((1 + poisson) * (1 - 2 * poisson)) + mu
-    result["damping"], result["scale"] = damping, np.maximum(scale, LEAST_SCALE)
+    result["damping"], result["scale"] = damping, np.maximum(scale, LEAST_DAMPING_SCALE)
     result["friction"] = 2 * friction
     rigidity = band.flexural_rigidity if rigidity is None else rigidity
     if rigidity is None:

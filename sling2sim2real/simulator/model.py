@@ -12,7 +12,7 @@ from sling2sim2real.settings.lab import SetupParams
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 
 GRAVITY = 9.81
-FAR = 1.0  # m, farther than a band is drawn
+FARTHEST_DRAW_M = 1.0  # m, farther than a band is drawn
 CYLINDER_DRAG = 1.1  # across the wind, at Reynolds numbers of 1e3 to 1e4 (Wieselsberger 1921)
 DOFS = 9  # of a cross-section: a node and two directors
 
@@ -36,7 +36,7 @@ class BandSizes(Protocol):
 def first_draw(band: BandSizes) -> float:
     """Largest draw of a band before it was recorded [m], 0 of a new one."""
     before = band.preconditioned
-    return FAR * before if isinstance(before, bool) else before
+    return FARTHEST_DRAW_M * before if isinstance(before, bool) else before
 
 
 class ClampValues(Protocol):

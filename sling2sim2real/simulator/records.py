@@ -10,9 +10,9 @@ from enum import IntEnum
 
 import numpy as np
 
-from sling2sim2real.simulator.rubber import TIMES
+from sling2sim2real.simulator.rubber import BRANCH_TIMES_S
 
-BRANCHES = len(TIMES)
+BRANCHES = len(BRANCH_TIMES_S)
 
 
 def _record(*fields: str | tuple[str, int]) -> np.dtype:

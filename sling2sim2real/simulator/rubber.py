@@ -7,7 +7,7 @@ up to the largest stretch that it has seen (Mullins; Ogden and Roxburgh, 10.1098
 `relaxation` is what rubber relaxes in each decade of time, about evenly (Ferry, Viscoelastic
 Properties of Polymers, 1980, ch. 1; latex over 24 h: docs/real.md). Eight branches carry it, evenly
 in log time from 3 ms to 10^4 s. What is faster is damping. Young's modulus is the one that is left
-after LATER: nobody waits for the slow branches, which in a rollout of some seconds are springs.
+after MODULUS_AFTER_S: nobody waits for the slow branches, which are springs in a rollout.
 
 `flow` is the share of that modulus with which a further branch pulls, whose overstress o flows by
 its fourth power (Bergstrom and Boyce 1998, 10.1016/S0022-5096(97)00075-6): o' = p' - r |o/E|^3 o, r
@@ -22,22 +22,22 @@ import numpy as np
 from sling2sim2real.settings.identification import LAWS
 
 NEO_HOOKEAN, RUBBER, COROTATED = LAWS
-TIMES = np.geomspace(0.003, 1e4, 8)  # of the branches [s]
-DECADES = np.log10(TIMES[1] / TIMES[0])  # from one to the next
-LATER = 10.0  # s after a sudden stretch
-JOIN = 0.05  # as in rubber.h
+BRANCH_TIMES_S = np.geomspace(0.003, 1e4, 8)  # of the branches [s]
+DECADES_A_BRANCH = np.log10(BRANCH_TIMES_S[1] / BRANCH_TIMES_S[0])  # from one to the next
+MODULUS_AFTER_S = 10.0  # s after a sudden stretch
+SOFTENING_JOIN = 0.05  # as in rubber.h
 FLOW_POWER = 3  # of |o/E|, by which the rate grows; as in rubber.h
 
 
 def memories(law: str) -> int:
     """Numbers that each edge remembers: of the branches, flow, and three that steps keep beside."""
-    return len(TIMES) + 1 + 3 if law == RUBBER else 0
+    return len(BRANCH_TIMES_S) + 1 + 3 if law == RUBBER else 0
 
 
 def relaxed(relaxation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Share of Young's modulus that never relaxes, and a branch's, at a relaxation (...)."""
-    weight = DECADES * np.asarray(relaxation, float)
-    return 1 - weight * np.exp(-LATER / TIMES).sum(), weight
+    weight = DECADES_A_BRANCH * np.asarray(relaxation, float)
+    return 1 - weight * np.exp(-MODULUS_AFTER_S / BRANCH_TIMES_S).sum(), weight
 
 
 def update(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -45,7 +45,7 @@ def update(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Exact where p is linear within the step; shapes (..., 8).
     """
-    part = np.asarray(h, float)[..., None] / TIMES
+    part = np.asarray(h, float)[..., None] / BRANCH_TIMES_S
     return np.exp(-part), -np.expm1(-part) / part
 
 
@@ -68,7 +68,7 @@ def work(
 def softened(work: np.ndarray, worst: np.ndarray, softening: np.ndarray | float) -> np.ndarray:
     """Share of the virgin stress that is left at a work, after the largest `worst`, >= 0 both."""
     gap = np.maximum(1 - work / np.maximum(worst, 1e-30), 0)
-    return 1 - (2 + JOIN) * softening * gap**2 / (gap**2 + gap + JOIN)
+    return 1 - (2 + SOFTENING_JOIN) * softening * gap**2 / (gap**2 + gap + SOFTENING_JOIN)
 
 
 def overstress(stress: np.ndarray, step: float) -> np.ndarray:
@@ -78,7 +78,7 @@ def overstress(stress: np.ndarray, step: float) -> np.ndarray:
         Shape (..., 8), in the unit of p; times a branch's share it adds to the stress.
     """
     forget, follow = update(np.array(step))
-    result = np.zeros((*stress.shape[:-1], len(TIMES)))
+    result = np.zeros((*stress.shape[:-1], len(BRANCH_TIMES_S)))
     for change in np.moveaxis(np.diff(stress, axis=-1), -1, 0):
         result = forget * result + follow * change[..., None]
     return result

@@ -10,7 +10,7 @@ from sling2sim2real.simulator.records import STEP, Grip, Mode
 from sling2sim2real.simulator.rubber import update
 
 RELAX_STEPS = 40
-LONG = 10.0 ** np.arange(1, 6)  # s: steps in which inertia counts for nothing
+STATICS_STEPS_S = 10.0 ** np.arange(1, 6)  # s: steps in which inertia counts for nothing
 
 
 @dataclass
@@ -61,4 +61,6 @@ def relaxation(grip: Grip) -> np.ndarray:
 
 def statics(grip: Grip) -> np.ndarray:
     """Steps to rest whatever the band's own times are, records (S,)."""
-    return np.concatenate([relaxation(grip), steps(LONG, 1.0, grip=grip, mode=Mode.RELAX)])
+    return np.concatenate(
+        [relaxation(grip), steps(STATICS_STEPS_S, 1.0, grip=grip, mode=Mode.RELAX)]
+    )

@@ -15,10 +15,10 @@ from sling2sim2real.simulator.records import LANE, OUTPUT, SETTING, numbers, rec
 from sling2sim2real.simulator.rubber import RUBBER, memories, work
 from sling2sim2real.simulator.schedule import Schedule
 
-LANES = 16  # slings in a CPU thread's SIMD lanes
-WARP = 32  # GPU threads that share a sling
+LANES_A_THREAD = 16  # slings in a CPU thread's SIMD lanes
+THREADS_A_WARP = 32  # GPU threads that share a sling
 STAGED = 84  # numbers that are staged of a section, as in state.h
-STEP_LIMIT = 0.004  # m, of Newton's method
+NEWTON_STEP_LIMIT_M = 0.004  # m, of Newton's method
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def memory(sling: ClampedBand, schedule: Schedule, n_frames: int, options: Optio
 
 
 RETURNED = ("state", "lanes", "output", "frames")
-LONG = ("output", "frames")
+MAY_STAY_ON_GPU = ("output", "frames")
 
 
 def _widths(
@@ -168,7 +168,7 @@ def _widths(
     """Numbers that each array which a kernel writes holds of one sling."""
     stored = ((2 * DOFS + 2) * (DOFS + 1) + STAGED) * sling.sections
     if options.on_gpu:  # by two chains, and for spare threads; sections are staged in shared memory
-        stored = (2 * DOFS + 2) * (sling.middle + 1) * WARP
+        stored = (2 * DOFS + 2) * (sling.middle + 1) * THREADS_A_WARP
     return {
         "state": DOFS * sling.sections,
         "lanes": width(LANE),
@@ -197,7 +197,7 @@ class _Work:
         from sling2sim2real.simulator.kernel import sling_kernel
 
         on_gpu, self.options = options.on_gpu, options
-        self.lanes = 1 if on_gpu else LANES // (2 if options.double else 1)
+        self.lanes = 1 if on_gpu else LANES_A_THREAD // (2 if options.double else 1)
         self.dtype = np.float64 if options.double else np.float32
         mesh = sling.law, sling.sections, sling.middle
         self.kernel, self.arrays = sling_kernel(*mesh, options.double, self.lanes, on_gpu)
@@ -266,7 +266,7 @@ class _Work:
 
     def _fetched(self, name: str, array, size: int):
         """A result of each sling, (slings, width); what is long may stay on a GPU."""
-        if name in LONG and self.options.on_gpu and not self.options.fetch:
+        if name in MAY_STAY_ON_GPU and self.options.on_gpu and not self.options.fetch:
             return array.reshape((size, self.widths[name]))
         values = array.numpy().reshape(size, self.widths[name], self.lanes)
         return values.transpose(0, 2, 1).reshape(size * self.lanes, self.widths[name])
@@ -283,7 +283,7 @@ def _setting(sling: ClampedBand, options: Options) -> np.ndarray:
         "wind": CYLINDER_DRAG * sling.air_density * sling.radius,
         "gravity": options.gravity,
         "tolerance": options.tolerance,
-        "step_limit": STEP_LIMIT,
+        "step_limit": NEWTON_STEP_LIMIT_M,
         "max_iterations": options.max_iterations,
         "clamped": sling.clamped,
         "shortest": sling.edge_lengths.min(),

@@ -23,8 +23,8 @@ GOOD = Findings(
     force=0.05, held=8e-4, recoil=2e-3, recoil_seen=True, disagreement=1.1, odd="",
     at_sides=(),
     stretch=1.5, recorded_stretch=1.6, hold_force=9.0, max_force=30.0, failures=(), converged=True,
-    miss=0.004, half_width=0.1, outside=1, scores=15, off=0.03, bias=-0.01, bias_error=0.01,
-    bias_of_half=-0.2, kind="virtual", left=0.01, observed=0, surprising=0,
+    miss=0.004, half_width=0.1, sides="−14/+6", outside=1, scores=15, off=0.03, bias=-0.01,
+    bias_error=0.01, bias_of_half=-0.2, kind="virtual", left=0.01, observed=0, surprising=0,
     carried=1.1, density=1e3, unloaded=True,
 )  # fmt: skip
 CASES = [
@@ -45,8 +45,8 @@ CASES = [
     ({"failures": ("The launch at 1.7 m fails in simulation: short.",)}, NO, "short"),
     ({"converged": False}, CARE, "did not converge"),
     ({"miss": 0.2}, NO, "misses a target by 20 cm"),
-    ({"half_width": 0.2}, CARE, "±20 cm only"),
-    ({"half_width": 0.6}, NO, "±60 cm only"),
+    ({"half_width": 0.2, "sides": "−35/+5"}, CARE, "−35/+5 cm only"),
+    ({"half_width": 0.6, "sides": "−70/+50"}, NO, "−70/+50 cm only"),
     ({"half_width": np.nan}, CARE, "not known"),
     ({"outside": 6}, CARE, "6 of 15 virtual launches"),
     ({"outside": 6, "off": 0.3}, NO, "30 cm off in the mean"),

@@ -16,7 +16,7 @@ from tests.card.conftest import BAND, PAIR
 
 FILES = {
     "README.md", "card.json", "index.html", "animation.webp", "camera.webp", "force.png",
-    "values.png", "landings.png",
+    "landings.png",
 }  # fmt: skip
 LIMITS = {"index.html": 3e6, "animation.webp": 2e6}  # bytes
 

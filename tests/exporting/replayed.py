@@ -5,9 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sling2sim2real.exporting.card import HOLD, LANDING
 from sling2sim2real.exporting.chain import SpringChain
-from sling2sim2real.exporting.match import compared, draws_of, proof_draws
+from sling2sim2real.exporting.match import (
+    HOLD_LIMIT,
+    LANDING_LIMIT,
+    compared,
+    draws_of,
+    proof_draws,
+)
 from sling2sim2real.exporting.proof import Matched
 
 DRAW = np.array([-0.35, -0.15])
@@ -31,8 +36,8 @@ def assert_proven(model, done) -> None:
         assert draw not in match
         ours = model.launches(draw)
         assert row["hold_force_n"] == pytest.approx(ours.hold_force[0], rel=1e-3)
-        assert row["landing_there_m"] == pytest.approx(ours.landing_y[0], rel=LANDING)
-        assert row["hold_force_there_n"] == pytest.approx(ours.hold_force[0], rel=HOLD)
+        assert row["landing_there_m"] == pytest.approx(ours.landing_y[0], rel=LANDING_LIMIT)
+        assert row["hold_force_there_n"] == pytest.approx(ours.hold_force[0], rel=HOLD_LIMIT)
     pull = done.card["pull"]
     assert pull["force_rms"] < 0.05 * pull["peak"]
     assert abs(pull["hold"]) < 0.03

@@ -9,7 +9,7 @@ import pytest
 from sling2sim2real import Band, Model, Theta
 from sling2sim2real.base.code import ROOT
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.exporting.chain import STEPS, SpringChain
+from sling2sim2real.exporting.chain import TIME_STEPS_S, SpringChain
 
 PLAIN = str.maketrans({"λ": "l", "−": "-", "⁻": "^-", "²": "^2"})
 
@@ -68,7 +68,7 @@ def test_the_first_guess_is_the_law_of_a_stretched_string() -> None:
 
 def test_a_stiffer_band_needs_shorter_steps(chain) -> None:
     steps = [replace(chain, strength=k).stable_step for k in (17.0, 51.0, 170.0)]
-    assert steps == sorted(steps, reverse=True) and {*steps} <= {*STEPS}
+    assert steps == sorted(steps, reverse=True) and {*steps} <= {*TIME_STEPS_S}
     assert replace(chain, damping_time=5e-3).stable_step < steps[0]
     with pytest.raises(UserError, match="time steps below"):
         _ = replace(chain, strength=1e9).stable_step

@@ -57,10 +57,14 @@ def test_another_band_would_be_noticed(model, chain) -> None:
 def test_it_is_held_as_in_mujoco() -> None:
     """The loader imports nothing of the project, so that it has constants of its own."""
     module = loader()
-    assert (module.SETTLE, module.BRAKE, module.LONGEST) == (
-        mujoco_replay.SETTLE, mujoco_replay.BRAKE, mujoco_replay.LONGEST,
+    assert (module.SETTLE_S, module.BRAKE_PER_S, module.LONGEST_RECOIL_S) == (
+        mujoco_replay.SETTLE_S, mujoco_replay.BRAKE_PER_S, mujoco_replay.LONGEST_RECOIL_S,
     )  # fmt: skip
-    assert (module.HAND_MASS, module.STIFF, module.GRAVITY) == (mjcf.HAND_MASS, mjcf.STIFF, GRAVITY)
+    assert (module.HAND_MASS_KG, module.RIGID_HAND_N_PER_M, module.GRAVITY) == (
+        mjcf.HAND_MASS_KG,
+        mjcf.RIGID_HAND_N_PER_M,
+        GRAVITY,
+    )
 
 
 @pytest.mark.parametrize("stiffness", [1.2e4, None])

@@ -31,7 +31,7 @@ def test_the_project_offers_its_match_in_physx() -> None:
     from sling2sim2real.engines.physx import match
 
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert imported(project["entry-points"][usd.GROUP]["usd"]) is match.matched
+    assert imported(project["entry-points"][usd.ENTRY_POINTS]["usd"]) is match.matched
 
 
 def test_its_law_is_hookes_when_small_and_stiffer_than_rubber_when_large() -> None:
@@ -119,7 +119,7 @@ def test_a_match_is_offered_by_an_entry_point_whose_module_can_be_imported(monke
     offered = {"usd": "math:sqrt", "newton": "no_such_module:match"}
 
     def entry_points(group: str, name: str) -> list:
-        assert group == usd.GROUP
+        assert group == usd.ENTRY_POINTS
         return [SimpleNamespace(value=offered[name])] if name in offered else []
 
     monkeypatch.setattr(usd, "entry_points", entry_points)
@@ -149,4 +149,4 @@ def test_what_is_matched_is_what_lands_near_the_targets(model) -> None:
     draws, _ = usd.near_draws(model)
     near, far = model.settings.policy.targets
     landing = model.launches(draws).landing_y
-    assert (landing > near / usd.NEAR).all() and (landing < far * usd.NEAR).all()
+    assert (landing > near / usd.TARGET_MARGIN).all() and (landing < far * usd.TARGET_MARGIN).all()

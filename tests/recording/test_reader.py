@@ -155,25 +155,6 @@ def test_a_missing_topic_is_named(params, blind) -> None:
         assert str(blind[0]) in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_missing_transforms_are_named_and_params_replace_them(tmp_path, params, blind) -> None:
-    path = blind_bag(tmp_path, without=("tf",))
-    recording = read(path, params)
-    with pytest.raises(UserError, match="setup.base_to_fork"):
-        geometry_of(recording, params.setup)
-
-    geometry = geometry_of(read(blind[0], params), params.setup)
-    poses = {
-        name: (*pose.translation, *pose.rotation.as_quat())
-        for name, pose in (
-            ("base_to_fork", geometry.base.inverse()),
-            ("camera_to_fork", geometry.camera.inverse()),
-        )
-    }
-    given = geometry_of(recording, params.setup.model_copy(update=poses))
-    np.testing.assert_allclose(given.base.apply([1, 2, 3]), geometry.base.apply([1, 2, 3]))
-    np.testing.assert_allclose(given.camera.apply([1, 2, 3]), geometry.camera.apply([1, 2, 3]))
-
-
 def test_files_that_are_no_recordings(tmp_path, params) -> None:
     missing, empty, text = (tmp_path / name for name in ("missing", "empty", "text"))
     empty.touch()

@@ -36,41 +36,36 @@ from tests.recording.messages import (
 from validation.recordings.small import STATE, STATE_FIELDS
 
 
-def test_a_pose_with_covariance(params) -> None:
-    messages = [
-        {**head(k), "pose": {"pose": pose_fields(POSES[k]), "covariance": []}} for k in range(COUNT)
-    ]
-    kind = "geometry_msgs/msg/PoseWithCovarianceStamped"
-    choice = chosen(params, wrench("/ft"), channel("/ee", kind, messages))["pose"]
+def in_frame(k: int, *poses: dict) -> dict:
+    return {"timestamp": head(k)["header"]["stamp"], "frame_id": "base", "poses": [*poses]}
+
+
+ONE = [pose_fields(values) for values in POSES]
+HANDS = {
+    "geometry_msgs/PoseStamped": [{**head(k), "pose": ONE[k]} for k in range(COUNT)],
+    "geometry_msgs/PoseWithCovarianceStamped": [
+        {**head(k), "pose": {"pose": ONE[k], "covariance": []}} for k in range(COUNT)
+    ],
+    "nav_msgs/Odometry": [
+        {**head(k), "child_frame_id": "tcp", "pose": {"pose": ONE[k]}} for k in range(COUNT)
+    ],
+    "foxglove.PosesInFrame": [in_frame(k, ONE[k]) for k in range(COUNT)],
+}
+
+
+@pytest.mark.parametrize("kind", HANDS)
+def test_a_hand_of_each_type(params, kind) -> None:
+    choice = chosen(params, wrench("/ft"), channel("/hand", kind, HANDS[kind]))["pose"]
     frame, values = played(choice)
-    assert (
-        frame == "base" and choice.why == "the only PoseWithCovarianceStamped for end-effector pose"
-    )
+    assert frame == "base"
+    assert choice.why == f"the only {choice.topic.kind} for end-effector pose"
     assert_poses(values)
+    both = chosen(params, wrench("/ft"), pose("/a"), channel("/ee", kind, HANDS[kind]))
+    assert kind == "geometry_msgs/PoseStamped" or both["pose"].topic.name == "/a"
 
 
-def test_an_odometry_and_one_pose_of_several(params) -> None:
-    odometry = [
-        {**head(k), "child_frame_id": "tcp", "pose": {"pose": pose_fields(POSES[k])}}
-        for k in range(COUNT)
-    ]
-    poses = [
-        {
-            "timestamp": head(k)["header"]["stamp"],
-            "frame_id": "base",
-            "poses": [pose_fields(POSES[k])],
-        }
-        for k in range(COUNT)
-    ]
-    for kind, sent in (("nav_msgs/Odometry", odometry), ("foxglove.PosesInFrame", poses)):
-        frame, values = played(chosen(params, wrench("/ft"), channel("/hand", kind, sent))["pose"])
-        assert frame == "base"
-        assert_poses(values)
-    assert (
-        chosen(params, wrench("/ft"), pose("/a"), channel("/ee", kind, sent))["pose"].topic.name
-        == "/a"
-    )
-    several = [{**message, "poses": 2 * message["poses"]} for message in poses]
+def test_one_of_several_poses_is_not_guessed(params) -> None:
+    several = [in_frame(k, ONE[k], ONE[k]) for k in range(COUNT)]
     with pytest.raises(UserError, match="/hand has fewer than two readable messages"):
         chosen(params, wrench("/ft"), channel("/hand", "foxglove.PosesInFrame", several))
 
@@ -114,7 +109,7 @@ def test_a_hand_that_is_in_tf_alone(params) -> None:
 
 def test_a_type_is_added_in_one_place(params, monkeypatch) -> None:
     """What is in the table is read, and chosen."""
-    sent = [{**head(k), "pose": pose_fields(POSES[k])} for k in range(COUNT)]
+    sent = HANDS["geometry_msgs/PoseStamped"]
     assert channel("/h", "a/Hand", sent).readings == {}
     monkeypatch.setitem(messages.TYPES, "Hand", {"pose": messages.read_pose})
     assert_poses(played(chosen(params, wrench("/ft"), channel("/h", "a/Hand", sent))["pose"])[1])

@@ -90,7 +90,8 @@ def test_gpus_share_a_batch_and_change_nothing(
         for name, values in first.terms.items():
             np.testing.assert_array_equal(other.terms[name], values)
 
-    monkeypatch.setattr(import_module("sling2sim2real.simulator.launch"), "SHARE", 1)
+    module = import_module("sling2sim2real.simulator.launch")
+    monkeypatch.setattr(module, "FEWEST_LAUNCHES_A_DEVICE", 1)
     thetas = space.parameters(space.to_physical(unit))
     first, *others = (
         launch(sling, launch_setup, thetas, [-0.4, -0.2], device=team) for team in teams

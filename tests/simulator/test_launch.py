@@ -50,7 +50,7 @@ def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch, launch_se
         (4, {("a", 5), ("b", 4)}),
         (1, {("a", 3), ("b", 3), ("c", 3)}),
     ):
-        monkeypatch.setattr(module, "SHARE", share)
+        monkeypatch.setattr(module, "FEWEST_LAUNCHES_A_DEVICE", share)
         requested.clear()
         several = launch(sling, launch_setup, neo(thetas), draws, device=("a", "b", "c"))
         assert set(requested) == expected and several.failure == single.failure

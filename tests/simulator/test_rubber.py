@@ -12,7 +12,7 @@ from sling2sim2real.simulator import interact, launch
 from sling2sim2real.simulator.launch import memory_of_pull
 from sling2sim2real.simulator.model import LaunchHistory
 from sling2sim2real.simulator.parameters import Parameters
-from sling2sim2real.simulator.rubber import RUBBER, TIMES, flowed, overstress, update
+from sling2sim2real.simulator.rubber import BRANCH_TIMES_S, RUBBER, flowed, overstress, update
 from tests.simulator.bands import neo
 
 THETA = np.array([3e5, 0.45, 2e-3, 0.5, 0.7])
@@ -127,9 +127,9 @@ def test_memory_of_a_pull_is_that_of_short_steps_and_fades(rubber):
     depth = 0.4 * part**2 * (3 - 2 * part)
     stretch = np.maximum(2 * np.hypot(rubber.half_width, depth) / rubber.rest_length, 1)
     stress = stretch - stretch**-2
-    summary = np.zeros(len(TIMES))
+    summary = np.zeros(len(BRANCH_TIMES_S))
     for change in np.diff(stress):
-        summary += change - step * summary / TIMES
+        summary += change - step * summary / BRANCH_TIMES_S
     np.testing.assert_allclose(carried, summary / stress[-1], atol=2e-3)
     assert np.all(np.diff(carried) >= -1e-12)  # slow branches keep more
     assert unrelaxed(rubber, LaunchHistory(4.0, 1e6), drawn).max() < 1e-6
@@ -175,7 +175,9 @@ def test_updates_are_exact_for_straight_histories():
     """Ramp of slope 1: o = t (1 - exp(-time / t)), whatever the steps."""
     for count in (1, 7):
         carried = overstress(np.linspace(0, 2.0, count + 1), 2.0 / count)
-        np.testing.assert_allclose(carried, TIMES * -np.expm1(-2.0 / TIMES), rtol=1e-12)
+        np.testing.assert_allclose(
+            carried, BRANCH_TIMES_S * -np.expm1(-2.0 / BRANCH_TIMES_S), rtol=1e-12
+        )
     forget, follow = update(np.array([1e-6, 1e3]))
     np.testing.assert_allclose(follow[0], 1, rtol=1e-3)
     assert forget[1, :3].max() < 1e-40

@@ -8,7 +8,15 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from sling2sim2real.settings.identification import LAWS
-from sling2sim2real.simulator.rubber import RUBBER, TIMES, relaxed, softened, uniaxial, update, work
+from sling2sim2real.simulator.rubber import (
+    BRANCH_TIMES_S,
+    RUBBER,
+    relaxed,
+    softened,
+    uniaxial,
+    update,
+    work,
+)
 from validation.real.data import Curve
 
 REACH = LAWS[RUBBER]
@@ -43,7 +51,7 @@ def history(
     eta = softened(done, most, values["softening"])
     left, weight = relaxed(values["relaxation"])
     forget, follow = update(np.diff(time))
-    over, total = np.zeros(len(TIMES)), np.empty(len(stretch))
+    over, total = np.zeros(len(BRANCH_TIMES_S)), np.empty(len(stretch))
     total[0] = left * virgin[0]
     for k, change in enumerate(np.diff(virgin)):
         over = forget[k] * over + follow[k] * change

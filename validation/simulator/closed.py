@@ -23,7 +23,7 @@ from scipy.integrate import quad, solve_ivp
 from sling2sim2real.simulator.material import material
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
-from sling2sim2real.simulator.rubber import TIMES
+from sling2sim2real.simulator.rubber import BRANCH_TIMES_S
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def left_of(stretch: float, most: float, shape: tuple[float, float], softening: 
 def relaxed_share(relaxation: float) -> tuple[float, float]:
     """What never relaxes of Young's modulus, and a branch's share of that."""
     weight = relaxation * np.log10(1e4 / 3e-3) / 7
-    left = 1 - weight * sum(np.exp(-10 / time) for time in TIMES)
+    left = 1 - weight * sum(np.exp(-10 / time) for time in BRANCH_TIMES_S)
     return left, weight / left
 
 
@@ -144,7 +144,7 @@ def integral(
         )
 
     def kernel(then: float) -> float:
-        return rate(then) * np.exp((then - time) / TIMES).sum()
+        return rate(then) * np.exp((then - time) / BRANCH_TIMES_S).sum()
 
     corners = [corner for corner in (0.2, 0.5) if corner < time]
     added = quad(kernel, 0, time, points=corners, limit=400, epsabs=1e-7)[0]

@@ -20,7 +20,13 @@ from sling2sim2real.simulator.initial import fixed_frames
 from sling2sim2real.simulator.material import material
 from sling2sim2real.simulator.model import GRAVITY, ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
-from sling2sim2real.simulator.rubber import COROTATED, JOIN, RUBBER, TIMES, relaxed
+from sling2sim2real.simulator.rubber import (
+    BRANCH_TIMES_S,
+    COROTATED,
+    RUBBER,
+    SOFTENING_JOIN,
+    relaxed,
+)
 
 TURNS = 1e-2  # of the modulus: keeps the spin of an unstressed edge regular
 HOLDS, TAUT = (
@@ -48,10 +54,12 @@ def _spin(pair: np.ndarray) -> np.ndarray:
 
 def _lost(gap: np.ndarray | float) -> np.ndarray:
     """Integral from 0 of what softening takes away at a gap, of softening 1."""
-    root = np.sqrt(1 - 4 * JOIN)
+    root = np.sqrt(1 - 4 * SOFTENING_JOIN)
     a, b = (1 + root) / 2, (1 - root) / 2
-    logs = ((a - JOIN) * np.log1p(gap / a) - (b - JOIN) * np.log1p(gap / b)) / root
-    return (2 + JOIN) * (gap - logs)
+    logs = (
+        (a - SOFTENING_JOIN) * np.log1p(gap / a) - (b - SOFTENING_JOIN) * np.log1p(gap / b)
+    ) / root
+    return (2 + SOFTENING_JOIN) * (gap - logs)
 
 
 def _sum(product: np.ndarray) -> np.ndarray:
@@ -100,13 +108,13 @@ class ReferenceRod:
     def branches(self) -> np.ndarray:
         """Weight of each over what never relaxes, shape (9,): those that relax, and what flows."""
         left, weight = relaxed(self.value("relaxation"))
-        return np.append(np.full(len(TIMES), weight), self.value("flow")) / left
+        return np.append(np.full(len(BRANCH_TIMES_S), weight), self.value("flow")) / left
 
     def fading(self, overstress: np.ndarray) -> np.ndarray:
         """Rates at which branches forget an overstress (..., E, 9) [Pa], the same shape [1/s]."""
         strain = np.abs(overstress[..., -1:]) / (3 * self.parameters[0])
         flow = 10 ** self.value("log_flow_rate") * strain**FLOW_POWER
-        times = np.broadcast_to(1 / TIMES, (*overstress.shape[:-1], len(TIMES)))
+        times = np.broadcast_to(1 / BRANCH_TIMES_S, (*overstress.shape[:-1], len(BRANCH_TIMES_S)))
         return np.concatenate([times, flow], axis=-1)
 
     def update(self, step: np.void, overstress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -116,7 +124,7 @@ class ReferenceRod:
             Shapes (E, 9) and (9,).
         """
         flow = 1 / (1 + step["h"] * self.fading(overstress)[:, -1:])
-        forget = np.broadcast_to(step["forget"], (len(flow), len(TIMES)))
+        forget = np.broadcast_to(step["forget"], (len(flow), len(BRANCH_TIMES_S)))
         return np.hstack([forget, flow]), np.append(step["follow"], 1.0)
 
     # ---- edges
@@ -195,7 +203,9 @@ class ReferenceRod:
         done = self.pulled(stretch)
         gap = 1 - done / np.where(self.worst > 0, self.worst, 1.0)
         gap = np.where((np.real(gap) > 0) & (self.worst > 0) & (np.real(stretch) > 1), gap, 0.0)
-        return 1 - (2 + JOIN) * self.value("softening") * gap**2 / (gap**2 + gap + JOIN)
+        return 1 - (2 + SOFTENING_JOIN) * self.value("softening") * gap**2 / (
+            gap**2 + gap + SOFTENING_JOIN
+        )
 
     def stored(self, stretch: np.ndarray) -> np.ndarray:
         """Free energy [Pa] of the softened stress: its integral at the largest work so far."""

@@ -19,7 +19,7 @@ from sling2sim2real.engines.physx.scene import Drive
 from sling2sim2real.exporting.mesh import Tube
 
 Steer = Callable[[np.ndarray], np.ndarray | None]
-SPACE = 10.0  # m: a band that leaves it has burst
+LARGEST_PLACE_M = 10.0  # m: a band that leaves it has burst
 BURST = "the band burst in PhysX"
 INTERPRETER = "SLING_PHYSX"  # the Python that has ovphysx; this one by default
 PACKAGES = "'ovphysx>=0.7,<0.8' physx-usd-schemas newton-usd-schemas"  # extra `physx`

@@ -15,18 +15,18 @@ import numpy as np
 
 from sling2sim2real.base.minimum_jerk import minimum_jerk
 from sling2sim2real.engines.physx import scene
-from sling2sim2real.engines.physx.bands import BURST, SPACE, Engine
+from sling2sim2real.engines.physx.bands import BURST, LARGEST_PLACE_M, Engine
 from sling2sim2real.engines.physx.law import force_on
 from sling2sim2real.engines.physx.scene import Drive
 from sling2sim2real.exporting.mesh import Tube
-from sling2sim2real.exporting.usd import RATE
+from sling2sim2real.exporting.usd import STEPS_PER_S
 from sling2sim2real.simulator.launch import Launches, outcomes
 from sling2sim2real.simulator.model import GRAVITY, ClampedBand, LaunchSetup
 from sling2sim2real.simulator.parameters import Parameters
 from sling2sim2real.simulator.records import LANE, Outcome
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 
-HANG, PULL, HOLD = 1.0, 2.0, 1.0  # s
+HANG_S, PULL_S, HOLD_S = 1.0, 2.0, 1.0  # s
 
 
 class Flight:
@@ -49,10 +49,10 @@ class Flight:
         places: np.ndarray,
     ) -> None:
         self.sling, self.setup, self.tube = sling, setup, tube
-        self.start, self.step = np.asarray(places), 1 / RATE
+        self.start, self.step = np.asarray(places), 1 / STEPS_PER_S
         self.parameters = Parameters.of(NEO_HOOKEAN, thetas)
         self.young, self.poisson, damping = np.asarray(thetas, float).T[:3]
-        self.delay, size = damping * RATE, len(places)
+        self.delay, size = damping * STEPS_PER_S, len(places)
         self.mass = setup.projectile_mass + tube.mass[tube.hand].sum()
         self.place = np.column_stack([np.zeros(size), self.start])
         self.direction = -self.place / np.linalg.norm(self.place, axis=1, keepdims=True)
@@ -64,7 +64,7 @@ class Flight:
     @np.errstate(all="ignore")  # burst bands
     def __call__(self, nodes: np.ndarray) -> np.ndarray | None:
         """One step. Bands that burst, and those whose projectile has left, are led no further."""
-        sound: Any = (np.abs(nodes) < SPACE).all(axis=(1, 2, 3))  # not a number: neither
+        sound: Any = (np.abs(nodes) < LARGEST_PLACE_M).all(axis=(1, 2, 3))  # not a number: neither
         self.burst |= ~sound & self._going
         self.lanes["outcome"][~sound & self._going] = Outcome.NOT_CONVERGED
         nodes = np.where(sound[:, None, None, None], nodes, self.tube.rest)
@@ -145,7 +145,7 @@ def launched(
 def drives(tube: Tube, places: np.ndarray) -> list[Drive]:
     """Hang in the clamps; then the middles are led to `places` (N, 2) and held there."""
     flat = tube.clamped.reshape(-1, 3)
-    hang, pull, hold = (round(time * RATE) for time in (HANG, PULL, HOLD))
+    hang, pull, hold = (round(time * STEPS_PER_S) for time in (HANG_S, PULL_S, HOLD_S))
     part = minimum_jerk(np.arange(1, pull + hold + 1) / pull)
     begin = flat[tube.hand].mean(axis=0)
     goals = np.column_stack([np.zeros(len(places)), places])

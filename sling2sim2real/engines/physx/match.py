@@ -33,18 +33,24 @@ from sling2sim2real.engines.physx.bands import INTERPRETER, Engine, release
 from sling2sim2real.engines.physx.launches import launched
 from sling2sim2real.exporting import usd
 from sling2sim2real.exporting.band import CalibratedBand
-from sling2sim2real.exporting.match import HOLD, LANDING, LOST, compared, proof_draws
+from sling2sim2real.exporting.match import (
+    HOLD_LIMIT,
+    LANDING_LIMIT,
+    LOST_LAUNCH_ERROR,
+    compared,
+    proof_draws,
+)
 from sling2sim2real.exporting.mesh import Tube
 from sling2sim2real.exporting.replay import Shot
 from sling2sim2real.exporting.usd import EDGES, GRADING, UsdBand, UsdMatch, near_draws
 from sling2sim2real.simulator.launch import Launches
 
 # Logarithms of modulus, mass and rest length; the clamps' height [m].
-WIDTHS = np.array([0.08, 0.25, 0.03, 0.01])  # to both sides, in the first round
-FARTHEST = np.array([0.5, 0.8, 0.1, 0.03])  # from where the match begins
-ROUNDS = 1.0, 0.5  # of WIDTHS
+ROUND_WIDTHS = np.array([0.08, 0.25, 0.03, 0.01])  # to both sides, in the first round
+FARTHEST_POINT = np.array([0.5, 0.8, 0.1, 0.03])  # from where the match begins
+ROUNDS = 1.0, 0.5  # of ROUND_WIDTHS
 CORRECTIONS = 2  # by the errors of the stage itself
-LONGEST = 300.0  # s, after which nothing more is tried
+LONGEST_MATCH_S = 300.0  # s, after which nothing more is tried
 ONE_BY_ONE = np.concatenate([np.zeros((1, 4)), np.eye(4)[1:], -np.eye(4)[1:]])  # a mesh each
 SCENES = ONE_BY_ONE[:, None] + np.outer([-1, 0, 1], np.eye(4)[0])  # in each three moduli, (7, 3, 4)
 
@@ -84,9 +90,9 @@ def fitted(
     (draws, ours), point, say = near_draws(model), np.zeros(4), _clock(model.band.name)
     slopes = np.empty((0, 4))
     for number, share in enumerate(ROUNDS, 1):
-        if number > 1 and say(f"round {number - 1} of {len(ROUNDS)}", point) > LONGEST:
+        if number > 1 and say(f"round {number - 1} of {len(ROUNDS)}", point) > LONGEST_MATCH_S:
             break
-        grids = point + share * WIDTHS * SCENES
+        grids = point + share * ROUND_WIDTHS * SCENES
         errors = []
         for i, grid in enumerate(grids, 1):
             errors.append(_errors(engine, model, band, draws, ours, grid))
@@ -98,9 +104,9 @@ def fitted(
         same = changed(model, band, point)
         shots = _launched_singly(engine, model, same, draws)
         left = _relative(shots, ours)
-        size = np.linalg.norm(np.nan_to_num(left, nan=LOST / LANDING))
+        size = np.linalg.norm(np.nan_to_num(left, nan=LOST_LAUNCH_ERROR / LANDING_LIMIT))
         tried.append((float(size), same, shots))
-        if say(f"stage {number + 1}, {_worst(shots, ours)}", point) > LONGEST:
+        if say(f"stage {number + 1}, {_worst(shots, ours)}", point) > LONGEST_MATCH_S:
             break
         point = _least(left - slopes @ point, slopes)
     return min(tried, key=lambda trial: trial[0])[1:]
@@ -133,14 +139,14 @@ def _linear(grid: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _least(constant: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Where errors (R,) + slopes (R, K) point are least in their squares, within FARTHEST.
+    """Where errors (R,) + slopes (R, K) point are least in their squares, within FARTHEST_POINT.
 
-    Beside them stands the way from the origin, of FARTHEST, so that nothing goes far for nothing.
+    Beside them stands the way from the origin, so that nothing goes far for nothing.
     """
     sound = np.isfinite(constant) & np.isfinite(slopes).all(axis=1)
-    rows = np.concatenate([slopes[sound], np.diag(1 / FARTHEST)])
-    wanted = np.concatenate([-constant[sound], np.zeros(len(FARTHEST))])
-    return lsq_linear(rows, wanted, (-FARTHEST, FARTHEST)).x
+    rows = np.concatenate([slopes[sound], np.diag(1 / FARTHEST_POINT)])
+    wanted = np.concatenate([-constant[sound], np.zeros(len(FARTHEST_POINT))])
+    return lsq_linear(rows, wanted, (-FARTHEST_POINT, FARTHEST_POINT)).x
 
 
 def _errors(
@@ -161,11 +167,14 @@ def _relative(shots: Sequence[Shot], ours: Launches) -> np.ndarray:
     """Logarithms of forces and landings over ours, of what is asked, shape (2 N,)."""
     there = np.array([[shot.hold_force, shot.landing] for shot in shots])
     wanted = np.column_stack([ours.hold_force, ours.landing_y])
-    return (np.log(there / wanted) / [HOLD, LANDING]).ravel()
+    return (np.log(there / wanted) / [HOLD_LIMIT, LANDING_LIMIT]).ravel()
 
 
 def _worst(shots: Sequence[Shot], ours: Launches) -> str:
-    force, landing = np.abs(_relative(shots, ours).reshape(-1, 2)).max(axis=0) * [HOLD, LANDING]
+    force, landing = np.abs(_relative(shots, ours).reshape(-1, 2)).max(axis=0) * [
+        HOLD_LIMIT,
+        LANDING_LIMIT,
+    ]
     return f"at most {100 * force:.1f} % of a force and {100 * landing:.1f} % of a landing off"
 
 

@@ -14,13 +14,13 @@ from scipy.interpolate import CubicSpline
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.minimum_jerk import minimum_jerk
-from sling2sim2real.engines.physx.bands import BURST, SPACE, Engine
+from sling2sim2real.engines.physx.bands import BURST, LARGEST_PLACE_M, Engine
 from sling2sim2real.engines.physx.law import force_on
 from sling2sim2real.engines.physx.scene import Drive
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.exporting.mesh import Tube
-from sling2sim2real.exporting.usd import EDGES, GRADING, RATE
-from sling2sim2real.simulator.interaction import GRASP_BLEND, Rollouts
+from sling2sim2real.exporting.usd import EDGES, GRADING, STEPS_PER_S
+from sling2sim2real.simulator.interaction import GRASP_BLEND_S, Rollouts
 from sling2sim2real.simulator.model import GRAVITY, ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
 from sling2sim2real.simulator.rubber import COROTATED, NEO_HOOKEAN
@@ -54,7 +54,7 @@ def phases(tube: Tube, episode: Episode) -> list[Drive]:
     """Hang, hold and fly free."""
     ends = tube.clamped.reshape(-1, 3)[tube.ends]
     hanging, held, free = (
-        np.arange(1, round(duration * RATE) + 1) / RATE
+        np.arange(1, round(duration * STEPS_PER_S) + 1) / STEPS_PER_S
         for duration in (
             SETTLE,
             episode.release_time - episode.grasp_time,
@@ -69,7 +69,7 @@ def phases(tube: Tube, episode: Episode) -> list[Drive]:
         Drive(
             np.concatenate([tube.ends, tube.hand]),
             np.concatenate([np.tile(ends, (len(held), 1, 1)), led], axis=1),
-            1 - minimum_jerk(held / GRASP_BLEND),
+            1 - minimum_jerk(held / GRASP_BLEND_S),
             keep=True,
         ),
         Drive(tube.ends, ends[None], np.zeros(len(free)), keep=True),
@@ -95,13 +95,13 @@ def rollouts(
     with np.errstate(all="ignore"):  # burst bands
         forces = force_on(tube, [tube.middle], held, thetas[:, 0], thetas[:, 1])
     center_lines = np.concatenate([held, free])[:, :, 1:-1, 0]
-    marks = episode.release_time + np.arange(1 - len(held), len(free) + 1) / RATE
-    times = [episode.grasp_time - 1 / RATE, *marks[: len(held)]]
+    marks = episode.release_time + np.arange(1 - len(held), len(free) + 1) / STEPS_PER_S
+    times = [episode.grasp_time - 1 / STEPS_PER_S, *marks[: len(held)]]
     times += [episode.release_time + sling.finger_opening_time, marks[-1]]
     section = tube.mass[tube.hand].sum()
     force, lines, failure = [], [], []
     for pull, line in zip(forces.swapaxes(0, 1), center_lines.swapaxes(0, 1), strict=True):
-        sound = np.isfinite(line).all() and np.abs(line).max() < SPACE
+        sound = np.isfinite(line).all() and np.abs(line).max() < LARGEST_PLACE_M
         on_hand = (pull if sound else np.nan * pull) - [0, 0, section * GRAVITY]
         force.append(np.concatenate([np.zeros((1, 3)), on_hand, np.zeros((2, 3))]))
         lines.append(_at(episode.cloud_time, marks, _between(sling.arc, tube.arc, line)))

@@ -10,62 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from sling2sim2real.exporting.mesh import Tube
-from sling2sim2real.exporting.usd import ITERATIONS, RATE, surface
-from sling2sim2real.simulator.model import GRAVITY
+from sling2sim2real.exporting.usd import STEPS_PER_S, stage
 
 SPACING = np.array([1.0, 2.5])  # m along x and y from band to band: none reaches the next
 COLUMNS = 32
-HEADER = """#usda 1.0
-(
-    defaultPrim = "World"
-    metersPerUnit = 1
-    upAxis = "Z"
-)
-
-def Xform "World"
-{
-    def PhysicsScene "PhysicsScene" (prepend apiSchemas = ["PhysxSceneAPI"])
-    {
-        vector3f physics:gravityDirection = (0, 0, -1)
-        float physics:gravityMagnitude = %(gravity)g
-        bool physxScene:enableGPUDynamics = 1
-        token physxScene:broadphaseType = "GPU"
-        token physxScene:solverType = "TGS"
-        uint physxScene:timeStepsPerSecond = %(rate)d
-    }
-"""
-BAND = """
-    def Material "M%(name)s" (prepend apiSchemas = ["PhysicsMaterialAPI",
-        "OmniPhysicsDeformableMaterialAPI", "PhysxDeformableMaterialAPI"])
-    {
-        float omniphysics:dynamicFriction = %(friction)g
-        float omniphysics:poissonsRatio = %(poisson).9g
-        float omniphysics:youngsModulus = %(young).9g
-        float physxDeformableMaterial:elasticityDamping = %(damping).9g
-    }
-
-    def TetMesh "B%(name)s" (prepend apiSchemas = ["OmniPhysicsDeformableBodyAPI",
-        "OmniPhysicsVolumeDeformableSimAPI", "OmniPhysicsDeformablePoseAPI:default",
-        "PhysicsCollisionAPI", "MaterialBindingAPI", "PhysxBaseDeformableBodyAPI"])
-    {
-        bool omniphysics:deformableBodyEnabled = 1
-        float omniphysics:mass = %(mass).9g
-        uint physxDeformableBody:solverPositionIterationCount = %(iterations)d
-        float physxDeformableBody:settlingDamping = 0
-        float physxDeformableBody:sleepThreshold = 0
-        point3f[] deformablePose:default:omniphysics:points = %(points)s
-        uniform token[] deformablePose:default:omniphysics:purposes = ["bindPose"]
-        point3f[] omniphysics:restShapePoints = %(points)s
-        int4[] omniphysics:restTetVtxIndices = %(tetrahedra)s
-        rel material:binding:physics = </World/M%(name)s> (
-            bindMaterialAs = "weakerThanDescendants"
-        )
-        point3f[] points = %(points)s
-        int3[] surfaceFaceVertexIndices = %(faces)s
-        int4[] tetVertexIndices = %(tetrahedra)s
-        float3 xformOp:translate = (%(x)g, %(y)g, 0)
+PLACE = """        float3 xformOp:translate = (%g, %g, 0)
         uniform token[] xformOpOrder = ["xformOp:translate"]
-    }
 """
 
 
@@ -90,7 +40,7 @@ class Drive:
 def job(tube: Tube, start: np.ndarray, phases: list[Drive]) -> dict:
     """What is done with the N bands of a stage, whose nodes begin at `start` (N, nodes, 3) [m]."""
     content = {
-        "step": 1 / RATE,
+        "step": 1 / STEPS_PER_S,
         "phases": len(phases),
         "offsets": offsets(len(start)),
         "rest": tube.rest.reshape(-1, 3),
@@ -113,22 +63,17 @@ def text(tube: Tube, thetas: np.ndarray) -> str:
     Args:
         thetas: The five parameters of each band, shape (N, 5); the damping scale has no slot.
     """
-    mesh = {
-        "points": _tuples(tube.rest.reshape(-1, 3), ".9g"),
-        "tetrahedra": _tuples(tube.tetrahedra, "d"),
-        "faces": _tuples(surface(tube.tetrahedra), "d"),
-        "mass": tube.mass.sum(),
-        "iterations": ITERATIONS,
-    }
-    parts = [HEADER % {"gravity": GRAVITY, "rate": RATE}]
-    for i, ((young, poisson, damping, friction, _), (x, y, _)) in enumerate(
-        zip(thetas, offsets(len(thetas)), strict=True)
-    ):
-        names = {"young": young, "poisson": poisson, "damping": damping, "friction": friction}
-        parts.append(BAND % {**mesh, **names, "name": f"{i:05d}", "x": x, "y": y})
-    return "".join(parts) + "}\n"
-
-
-def _tuples(rows: np.ndarray, form: str) -> str:
-    """Rows as USD's text form has them."""
-    return "[" + ", ".join(f"({', '.join(format(v, form) for v in row)})" for row in rows) + "]"
+    rows = zip(thetas, offsets(len(thetas)), strict=True)
+    names = "young", "poisson", "damping", "friction"
+    return stage(
+        tube,
+        [
+            {
+                **dict(zip(names, theta[:4], strict=True)),
+                "material": f"M{i:05d}",
+                "name": f"B{i:05d}",
+                "place": PLACE % tuple(place[:2]),
+            }
+            for i, (theta, place) in enumerate(rows)
+        ],
+    )

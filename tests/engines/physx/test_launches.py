@@ -97,7 +97,7 @@ def test_springs_throw_as_far_as_the_closed_form_says(
 ):
     """By worker.py, job after job; leapfrog's error is (pulse x step)^2 / 24, and small."""
     for rate in (200, 1000):
-        monkeypatch.setattr(launches, "RATE", rate)
+        monkeypatch.setattr(launches, "STEPS_PER_S", rate)
         text = scene.text(tube, THETAS)
         done = launches.launched(engine, text, tube, THETAS, sling, launch_setup, DRAWS)
         assert done.failure == [None] * 3
@@ -150,7 +150,7 @@ def test_beside_a_band_with_mass_it_is_as_fast_as_within(
 
     monkeypatch.setattr(launches, "force_on", force_on)
     monkeypatch.setattr(launches, "GRAVITY", 0.0)
-    monkeypatch.setattr(launches, "RATE", rate)
+    monkeypatch.setattr(launches, "STEPS_PER_S", rate)
     flying = flown(sling, launch_setup, tube, THETAS[:1], DRAWS[:1])
     mass = launches.Flight(sling, launch_setup, tube, THETAS[:1], DRAWS[:1]).mass
     while chain.tension()[-1] > 0:

@@ -107,7 +107,7 @@ def test_the_least_of_a_linear_model_is_found_and_lost_draws_do_not_count() -> N
         match._linear(grid, np.full((12, 2), np.nan))
     slopes = np.array([[50.0, 0.0, 0.0, 0.0]])
     assert match._least(np.array([1.0]), slopes) == pytest.approx([-0.02, 0, 0, 0], rel=1e-2)
-    assert match._least(np.array([1e3]), slopes)[0] == pytest.approx(-match.FARTHEST[0])
+    assert match._least(np.array([1e3]), slopes)[0] == pytest.approx(-match.FARTHEST_POINT[0])
 
 
 def test_an_arm_gives_way_towards_the_fork() -> None:

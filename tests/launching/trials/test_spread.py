@@ -13,7 +13,7 @@ from sling2sim2real.launching.trials.spread import (
     shortest,
     smoothed,
 )
-from sling2sim2real.simulator.launch import CROSS
+from sling2sim2real.simulator.launch import CENTRAL_DIFFERENCES_M
 from tests.policy import toy
 
 DRAWS = np.array([[-0.35, -0.2], [-0.3, -0.15]])
@@ -93,7 +93,7 @@ def test_an_answer_takes_few_launches() -> None:
 
     spread = landing_spread(counted, DRAWS[:1], samples(2000), 0.001)
     few = spread.interval
-    assert sum(launched) == len(CROSS) + MOST and len(spread.chosen) == MOST
+    assert sum(launched) == len(CENTRAL_DIFFERENCES_M) + MOST and len(spread.chosen) == MOST
     again = launcher(np.repeat(DRAWS[:1], MOST, axis=0), samples(2000)[spread.chosen])
     np.testing.assert_array_equal(spread.centres[0], again.landing_y)  # it says which they are
     many = np.quantile(toy.launch(DRAWS[:1]).landing_y * samples(2000)[:, 0], [0.05, 0.95])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.exporting.mesh import CLAMPED, Tube
+from sling2sim2real.exporting.mesh import CLAMPED_LENGTH_M, Tube
 from validation.engines import checks
 from validation.simulator.closed import String
 
@@ -39,7 +39,7 @@ def elastic_force(tube: Tube, positions: np.ndarray, theta) -> np.ndarray:
 
 def test_it_weighs_as_much_as_the_band_and_what_is_in_the_clamps(sling):
     tube = Tube.of(sling)
-    whole = 1 + 2 * CLAMPED / sling.rest_length
+    whole = 1 + 2 * CLAMPED_LENGTH_M / sling.rest_length
     assert tube.mass.sum() == pytest.approx(sling.mass * whole)
     assert tube.arc[[0, -1]] == pytest.approx([0, sling.rest_length])
     assert tube.rest[tube.middle, 0, 0] == pytest.approx(sling.rest_length / 2)
@@ -49,7 +49,7 @@ def test_it_hangs_in_the_clamps_unstretched(sling):
     tube = Tube.of(sling)
     tips = tube.clamped[[1, -2], 0]
     assert tips == pytest.approx(sling.tips, abs=1e-12)
-    assert tube.clamped[0, 0] - tips[0] == pytest.approx(-CLAMPED * sling.clamp_direction)
+    assert tube.clamped[0, 0] - tips[0] == pytest.approx(-CLAMPED_LENGTH_M * sling.clamp_direction)
     edges = np.linalg.norm(np.diff(tube.hanging[1:-1, 0], axis=0), axis=1)
     assert edges == pytest.approx(np.diff(tube.arc), rel=0.01)
 

@@ -48,7 +48,7 @@ CASES = {
 ADDED = {
     FIT: "--mass 0.05, --diameter 0.011, --rest-length 0.5, --policy, --json",
     "check seen.mcap": "--mass 0.05, --diameter 0.02, --rest-length 0.5, --pull 2,"
-    " --sheet sheet.txt, --rrd line.txt, --pictures bands, --frames, --json",
+    " --sheet sheet.txt, --pictures bands, --frames, --json",
     SETUP: "--left-tip=0.7,0.1375,0.42, --right-tip=0.7,-0.1375,0.42, --fork-width 0.3,"
     f" --base-to-camera={POSE}, --camera-to-fork=0,0,0.9,1,0,0,0, --floor=-0.1, --draw-y=-0.4,-0.3,"
     " --draw-z=-0.2,-0.1, --tool=0.7,0,0,0.05, --topic wrench=/ft, --json",

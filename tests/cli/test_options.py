@@ -41,6 +41,8 @@ CASES = {
     "observe --draw": (OBSERVE, OBSERVE.replace("0.30", "0.31")),
     "observe --landing": (OBSERVE, OBSERVE.replace("2.3", "2.4")),
     "export band": (EXPORT, EXPORT.replace("toy", "no")),
+    "view band": ("view bands/toy", "view bands/no"),
+    "view --save": ("view bands/toy", "view bands/toy --save out.rrd"),
     "export --to": (EXPORT, EXPORT.replace("mjcf", "usd")),
     "--version": ("setup", "--version"),
 }
@@ -143,6 +145,7 @@ def echo(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("sling2sim2real.cli.observe.fit", lambda folder: None)
     patch.setattr("sling2sim2real.cli.preflight.command.look_at", look_at)
     patch.setattr("sling2sim2real.api.exporting.export", export)
+    patch.setattr("sling2sim2real.cli.view.view", lambda *given: repr(given[1]))
 
 
 def once(outcomes: dict[str, tuple], outcome: Callable[[str], tuple], line: str) -> tuple:

@@ -101,7 +101,6 @@ def fit(arguments: argparse.Namespace) -> Done:
     *SIZES,
     flag("--pull", type=kinds.count, metavar="N", help="which pull; default: the first usable one"),
     flag("--sheet", type=Path, metavar="OUT.png", help="draw six moments, force and coverage"),
-    flag("--rrd", type=Path, metavar="OUT.rrd", help="write one timeline for Rerun's viewer"),
     flag("--pictures", type=Path, metavar="FOLDER", help="write the pictures to mask elsewhere"),
     flag("--frames", action="store_true", help="with --json, also a row for each picture"),
     JSON,
@@ -111,7 +110,7 @@ def check(arguments: argparse.Namespace) -> Done:
 
     if arguments.frames and not arguments.json:
         arguments.refuse("argument --frames: used with --json alone")
-    wanted = {name: getattr(arguments, name) for name in ("sheet", "rrd", "pictures", "pull")}
+    wanted = {name: getattr(arguments, name) for name in ("sheet", "pictures", "pull")}
     options = wanted | {"as_json": arguments.json, "frames": arguments.frames}
     from sling2sim2real.api.band_folder import BandFolder
 

@@ -17,8 +17,7 @@ from sling2sim2real.api.band_folder import BandFolder
 from sling2sim2real.api.identification import Identification
 from sling2sim2real.api.launching import draw_for
 from sling2sim2real.base.errors import Refused, UserError
-from sling2sim2real.base.files import replacing
-from sling2sim2real.base.layout import NotMade
+from sling2sim2real.base.files import NotMade, replacing
 from sling2sim2real.card.camera import Pictures
 from sling2sim2real.card.simulated import Simulated, simulate
 from sling2sim2real.episode.episode import Episode

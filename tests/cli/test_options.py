@@ -41,6 +41,8 @@ CASES = {
     "observe --draw": (OBSERVE, OBSERVE.replace("0.30", "0.31")),
     "observe --landing": (OBSERVE, OBSERVE.replace("2.3", "2.4")),
     "export band": (EXPORT, EXPORT.replace("toy", "no")),
+    "view band": ("view bands/toy", "view bands/no"),
+    "view --save": ("view bands/toy", "view bands/toy --save out.rrd"),
     "export --to": (EXPORT, EXPORT.replace("mjcf", "usd")),
     "--version": ("setup", "--version"),
 }
@@ -48,7 +50,7 @@ CASES = {
 ADDED = {
     FIT: "--mass 0.05, --diameter 0.011, --rest-length 0.5, --policy, --json",
     "check seen.mcap": "--mass 0.05, --diameter 0.02, --rest-length 0.5, --pull 2,"
-    " --sheet sheet.txt, --rrd line.txt, --pictures bands, --frames, --json",
+    " --sheet sheet.txt, --pictures bands, --frames, --json",
     SETUP: "--left-tip=0.7,0.1375,0.42, --right-tip=0.7,-0.1375,0.42, --fork-width 0.3,"
     f" --base-to-camera={POSE}, --camera-to-fork=0,0,0.9,1,0,0,0, --floor=-0.1, --draw-y=-0.4,-0.3,"
     " --draw-z=-0.2,-0.1, --tool=0.7,0,0,0.05, --topic wrench=/ft, --json",
@@ -143,6 +145,7 @@ def echo(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("sling2sim2real.cli.observe.fit", lambda folder: None)
     patch.setattr("sling2sim2real.cli.preflight.command.look_at", look_at)
     patch.setattr("sling2sim2real.api.exporting.export", export)
+    patch.setattr("sling2sim2real.cli.view.view", lambda *given: repr(given[1]))
 
 
 def once(outcomes: dict[str, tuple], outcome: Callable[[str], tuple], line: str) -> tuple:

@@ -251,7 +251,7 @@ def report(args: argparse.Namespace, params: Params, count: int, results: list[d
 
 
 WORDS = {  # of the table
-    PAPER: "Sling2Sim2Real",
+    PAPER: "`paper`",
     "no_work": "−L_work",
     "no_covariance": "−c",
     "no_multistart": "−m",

@@ -1,65 +1,72 @@
-"""A recording that this project did not make: does the identified band land where it was measured?
+"""Recordings that this project did not make: do the identified bands land where it was measured?
 
-A band's folder, by the commands that a lab types. The landings are read after θ is written.
+Bands' folders, by the commands that a lab types: one of each recording, one of all. The landings
+are read after θ is written.
 """
 
-import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sling2sim2real import Identification
+from sling2sim2real import Identification, launch
 from sling2sim2real.base.code import ROOT
-from sling2sim2real.launching.trials.stretch import stretch_of
 from validation.orange import ABOUT, NAME, landings
 from validation.projects import SLING, ProjectCopy
 
 pytestmark = pytest.mark.validation
 
 RECORDINGS = ROOT.parent / "shared/recordings"
-LIMIT = 0.05
+ONE_EACH = {name: [f"{name}.mcap"] for name in (NAME, f"{NAME}_2", f"{NAME}_3")}
+BANDS = ONE_EACH | {"all": [file for files in ONE_EACH.values() for file in files]}
 LAB = "setup:\n  arm_stiffness: null\n"  # its note says where the hand was, not where it was sent
+ERROR = 1e-3  # m, of a draw
+MOST = {"each": 0.02, "all": 0.012}  # of the bias
+LEAST_INSIDE = 0.85
+
+
+def figures_of(band: Path) -> dict:
+    """How predicted landings compare with measured ones, as shares of the distance."""
+    found, (draws, measured) = Identification.load(band), landings(RECORDINGS)
+    assert found.settings.setup.arm_stiffness is None
+    launched = [launch(found, tuple(draw), error=ERROR) for draw in draws.tolist()]
+    error = np.array([shot.landing for shot in launched]) / measured - 1
+    low, high = np.array([shot.interval_90 or (np.nan, np.nan) for shot in launched]).T
+    return {
+        "bias": np.nanmean(error),
+        "spread": np.nanstd(error),
+        "inside": int(((measured >= low) & (measured <= high)).sum()),
+        "launches": len(measured),
+        "failed": sum(shot.failure is not None for shot in launched),
+        "mean_width": np.nanmean((high - low) / measured),
+        "theta": vars(found.theta),
+    }
 
 
 @pytest.mark.skipif(
     not (RECORDINGS / f"{NAME}_landings.csv").exists(),
-    reason="the recording of the orange band is not beside the project",
+    reason="the recordings of the orange band are not beside the project",
 )
-def test_landings_are_predicted_within_the_recorded_stretch(tmp_path, progress, record) -> None:
+def test_recordings_that_this_project_did_not_make(tmp_path, progress, record) -> None:
     (tmp_path / "bands").mkdir()
     (tmp_path / "bands/lab.yaml").write_text(LAB)
-    sizes = [f"--{name.replace('_', '-')}={ABOUT[name]}" for name in ("mass", "diameter")]
-    recording, start = RECORDINGS / f"{NAME}.mcap", time.perf_counter()
-    ProjectCopy(tmp_path)(*SLING, "fit", str(recording), "--name", NAME, *sizes)
-    wall = time.perf_counter() - start
-    found = Identification.load(tmp_path / "bands" / NAME)
-    assert found.settings.setup.arm_stiffness is None
-
-    draws, measured = landings(RECORDINGS)
-    launched, setup = found.launches(draws), found.settings.setup
-    error = launched.landing_y / measured - 1
-    points = np.insert(draws, 0, 0, axis=1)
-    inside = stretch_of(points, setup.fork_width, found.band.rest_length) <= found.stretch
-    met = inside.any() and launched.failure == [None] * len(draws)
-    met = bool(met and np.abs(error[inside]).mean() <= LIMIT)
-    for name, part in (("inside", inside), ("beyond", ~inside)):
-        progress(f"  {part.sum()} {name}: {100 * np.abs(error[part]).mean():.2f} %")
+    sizes = [f"--mass={ABOUT['mass']}", f"--diameter={ABOUT['diameter']}"]
+    run, figures = ProjectCopy(tmp_path), {}
+    for name, files in BANDS.items():
+        run(*SLING, "fit", *(str(RECORDINGS / file) for file in files), "--name", name, *sizes)
+        figures[name] = figures_of(tmp_path / "bands" / name)
+        progress(f"  {name}: {100 * figures[name]['bias']:+.2f} %, {figures[name]['inside']} in")
+    bias = {name: abs(of["bias"]) for name, of in figures.items()}
     record(
         "orange",
-        requested="Identified from one recording by an independent engine and renderer (no robot),"
-        " with the defaults of `sling fit`: the launches inside the recorded stretch are predicted"
-        f" within {100 * LIMIT:g} % of distance on average. No landing is used for fitting.",
-        met=met,
+        requested="Landings of a band of another engine and renderer, identified by `sling fit`:"
+        f" |bias| at most {100 * MOST['each']:g} % by each of its three recordings,"
+        f" {100 * MOST['all']:g} % by all together. No landing was evidence; the choice of"
+        " `turn_damping` as a coordinate came from these recordings' pictures.",
+        met=max(bias[name] for name in ONE_EACH) <= MOST["each"] and bias["all"] <= MOST["all"],
         settings={"band": ABOUT, "lab": LAB},
-        figures={
-            "theta": vars(found.theta),
-            "draws_m": draws,
-            "measured_m": measured,
-            "error": error,
-            "inside": inside,
-            "failure": launched.failure,
-            "recorded_stretch": found.stretch,
-            "wall_seconds_to_theta": wall,
-        },
+        figures=figures,
     )
-    assert met
+    assert all(of["failed"] == 0 for of in figures.values())
+    for name in ONE_EACH:
+        assert figures[name]["inside"] >= LEAST_INSIDE * figures[name]["launches"]

@@ -8,15 +8,8 @@ from pathlib import Path
 
 from sling2sim2real.api.arguments import USUAL
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.cli.preflight.facts import (
-    BandFacts,
-    CloudFacts,
-    DelayFacts,
-    ExtrinsicFacts,
-    MotionPhase,
-    SignalSummary,
-)
-from sling2sim2real.cli.preflight.report import CheckReport, Chosen, Topic
+from sling2sim2real.cli.preflight import facts
+from sling2sim2real.cli.preflight.report import CheckReport, Topic
 from sling2sim2real.episode.phases import phases_of_hand, unseen
 from sling2sim2real.recording.build import Processed, Whole, process
 from sling2sim2real.recording.checks import Finding
@@ -72,10 +65,14 @@ class GivenBand:
         return cls(band, source, weighed="mass" in sizes)
 
     @property
-    def facts(self) -> BandFacts:
+    def facts(self) -> facts.Facts:
         band = self.params
-        mass = float(band.mass) if self.weighed else None
-        return BandFacts(float(band.diameter), float(band.rest_length), self.source, mass)
+        return {
+            "diameter_m": float(band.diameter),
+            "rest_length_m": float(band.rest_length),
+            "source": self.source,
+            "mass_kg": float(band.mass) if self.weighed else None,
+        }
 
 
 def expect_long(rest_length: float, setup: SetupParams) -> None:
@@ -141,18 +138,16 @@ def _look_at_pull(report: CheckReport, done: Processed) -> Look:
     report.cautions = done.cautions
     report.problem = _without(recording.path, refusal) if refusal else None
     if done.delays:
-        report.delays = DelayFacts.of(done.delays)
+        report.delays = facts.of_delays(done.delays)
     if signals and done.scene:
-        report.signals = facts = SignalSummary.of(recording, signals, done.scene)
-        phases = phases_of_hand(signals)
-        report.motion = [MotionPhase.of(phase, facts.window_start_s) for phase in phases]
+        report.signals = facts.of_signals(recording, signals, done.scene)
+        phases, start = phases_of_hand(signals), report.signals["window_start_s"]
+        report.motion = [facts.of_phase(phase, start) for phase in phases]
         report.keeps_prior = unseen(phases)
     if whole:
-        report.cloud = CloudFacts.of(whole.clouds, whole.taut_coverage)
+        report.cloud, report.extrinsics = facts.of_clouds(whole), facts.of_extrinsics(whole)
         report.coverage = whole.coverage
         report.phases = by_phase(report.coverage)
-        if whole.calibration:
-            report.extrinsics = ExtrinsicFacts.of(whole.calibration, part.geometry)
     return Look(report, recording, whole)
 
 
@@ -170,7 +165,7 @@ def _add_roles(topics: list[Topic], recording: Recording) -> None:
     for role, stream in recording.streams.items():
         place = places[stream.topic]
         row = topics[place]
-        topics[place] = Chosen(
+        topics[place] = Topic(
             row.topic,
             row.type,
             row.messages,

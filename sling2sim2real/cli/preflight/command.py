@@ -13,7 +13,7 @@ from sling2sim2real.cli.preflight.output import expect_writable, written
 from sling2sim2real.cli.preflight.pictures import expect_new, write_pictures
 from sling2sim2real.settings import Settings
 
-DRAWN = "sheet", "rrd", "pictures"
+DRAWN = "sheet", "pictures"
 
 
 def check_band(
@@ -63,7 +63,6 @@ def checked(
     as_json: bool = False,
     frames: bool = False,
     sheet: Path | None = None,
-    rrd: Path | None = None,
     pictures: Path | None = None,
     pull: int | None = None,
 ) -> tuple[str, int]:
@@ -74,7 +73,7 @@ def checked(
         band: With what is known of it.
         as_json: The report as JSON, with what was drawn under `written`.
         frames: There, a row a picture under `coverage`.
-        sheet, rrd: Files to write.
+        sheet: File to write.
         pictures: Folder to write, of what `cloud.mask: folder` wants masks of.
         pull: Which of several; None for the first that can be used, if there is one.
 
@@ -86,8 +85,6 @@ def checked(
     """
     if sheet:
         expect_writable(sheet, ".png")
-    if rrd:
-        expect_writable(rrd, ".rrd")
     if pictures:
         expect_new(pictures)
     look = look_at(recording, params, band, pull)
@@ -96,11 +93,6 @@ def checked(
 
         with written(sheet):
             look.report.written.append(draw_sheet(look, params, sheet))
-    if rrd:
-        from sling2sim2real.cli.preflight.timeline import write_timeline
-
-        with written(rrd):
-            look.report.written.append(write_timeline(look, params, rrd))
     if pictures:
         with written(pictures):
             message = write_pictures(look.pulls, pictures)

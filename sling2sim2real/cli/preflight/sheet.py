@@ -12,7 +12,7 @@ import numpy as np
 
 from sling2sim2real.base.files import replacing
 from sling2sim2real.cli.preflight.check import Look
-from sling2sim2real.cli.preflight.facts import SignalSummary
+from sling2sim2real.cli.preflight.facts import Facts
 from sling2sim2real.drawing.names import as_label
 from sling2sim2real.drawing.styles import COLORS, INK, THEME
 from sling2sim2real.recording import images
@@ -107,11 +107,11 @@ def _seen(done: Whole, params: Settings) -> list[Moment]:
 
 
 def _whole(
-    figure: Figure, done: Whole, facts: SignalSummary, rows: list[PictureLine], params: Settings
+    figure: Figure, done: Whole, facts: Facts, rows: list[PictureLine], params: Settings
 ) -> None:
     from sling2sim2real.drawing.canvas import key, mark  # imports Matplotlib
 
-    seen, start = _seen(done, params), facts.window_start_s
+    seen, start = _seen(done, params), facts["window_start_s"]
     grid = figure.add_gridspec(5, len(seen), height_ratios=[0.88, 0.55, 0.92, 1.0, 0.55])
     for column, moment in enumerate(seen):
         axes = figure.add_subplot(grid[0, column])
@@ -168,9 +168,9 @@ def _cloud(axes: Axes, done: Whole, moment: Moment, a: int, b: int, labels: bool
         axes.tick_params(labelbottom=False, labelleft=False)
 
 
-def _force(axes: Axes, done: Whole, facts: SignalSummary) -> None:
+def _force(axes: Axes, done: Whole, facts: Facts) -> None:
     """Draw each component of the force and its size: seconds since the recording's first force."""
-    signals, start = done.signals, facts.window_start_s
+    signals, start = done.signals, facts["window_start_s"]
     time = start + signals.time
     for axis, values, color in zip("xyz", signals.force.T, COLORS, strict=False):
         axes.plot(time, values, color=color, lw=1.2, label=f"$F_{axis}$")
@@ -192,8 +192,8 @@ def _coverage(axes: Axes, rows: list[PictureLine]) -> None:
     other.grid(visible=False)
 
 
-def _events(axes: Axes, done: Whole, facts: SignalSummary, named: bool = False) -> None:
-    for name, time in (("grasp", facts.grasp_s), ("release", facts.release_s)):
+def _events(axes: Axes, done: Whole, facts: Facts, named: bool = False) -> None:
+    for name, time in (("grasp", facts["grasp_s"]), ("release", facts["release_s"])):
         axes.axvline(time, color=INK, lw=0.8, ls="--")
         if not named:
             continue
@@ -204,7 +204,7 @@ def _events(axes: Axes, done: Whole, facts: SignalSummary, named: bool = False) 
             va="bottom",
             ha="center",
         )
-    start = facts.window_start_s
+    start = facts["window_start_s"]
     for time in moments(done.scene).values():
         axes.plot(start + time, 0, "|", color=INK, ms=8, transform=axes.get_xaxis_transform())
 

@@ -80,8 +80,8 @@ def test_a_robot_that_follows_the_plan_makes_a_recording_that_check_accepts(reco
     )
     report = look_at(path, params, GivenBand.of({}, params.setup)).report
     assert report.usable, report.problem
-    assert report.signals.release_s == pytest.approx(truth.release, abs=1e-3)
-    assert report.signals.draw_m == pytest.approx([0, -0.4, 0], abs=1e-3)
+    assert report.signals["release_s"] == pytest.approx(truth.release, abs=1e-3)
+    assert report.signals["draw_m"] == pytest.approx([0, -0.4, 0], abs=1e-3)
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from sling2sim2real.engines.physx import rollouts
 from sling2sim2real.identification.objective import evaluate
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator, simulate_of, simulated
-from sling2sim2real.identification.objective.loss import TERMS, EpisodeLoss
+from sling2sim2real.identification.objective.loss import TERMS
 from sling2sim2real.settings.identification import ENGINES, OUR_ENGINE
 from sling2sim2real.simulator.parameters import THETA
 from tests.identification.objective import toy, toy_engine
@@ -100,28 +100,6 @@ def test_what_a_device_raises_is_raised() -> None:
 
     with pytest.raises(UserError, match="out of memory"):
         evaluator(devices=["cpu", "cpu"], simulate=broken)(np.full((3, 2), 0.5))
-
-
-def test_nor_does_either_where_a_law_adds_its_own_axes() -> None:
-    """Those of the law rubber, each of which changes the loss."""
-    sling, recorded = recorded_yardstick(PARAMS)
-    sling = replace(sling, law="rubber")
-    box = SearchBox.of_method(PARAMS, "posterior")
-    unit = np.random.default_rng(1).random((20, box.dimension))  # more than a slice
-    unit[1:3] = unit[0]
-    unit[1, box.names.index("mooney_share")] += 0.1
-    unit[2, box.names.index("relaxation")] += 0.1
-    unit[:3] %= 1
-    evaluations = []
-    loss = EpisodeLoss.of(PARAMS, "posterior", recorded, sling)
-    for workers, devices in ((1, ["cpu"]), (2, ["cpu"]), (1, ["cpu", "cpu"])):
-        evaluate = Evaluator(recorded, sling, loss, box, workers=workers, devices=devices)
-        evaluations.append(evaluate(unit))
-    assert evaluations[0].failure == evaluations[1].failure == evaluations[2].failure
-    assert np.isfinite(evaluations[0].total[:3]).all() and len(set(evaluations[0].total[:3])) == 3
-    for name in TERMS:
-        for other in evaluations[1:]:
-            np.testing.assert_array_equal(evaluations[0].terms[name], other.terms[name])
 
 
 def test_failures_are_infinite_and_have_a_reason() -> None:

@@ -39,8 +39,10 @@ class Case:
         self.nuisance_slopes = rng.normal(0, 50, (INNER, size))
         self.nuisances = np.array([1e-4, -3e-4, 4e-6])
 
-    def spread(self, force, cloud, way) -> np.ndarray:
-        return np.concatenate([np.full(3 * FORCES, force), np.full(2 * BINS, np.hypot(cloud, way))])
+    def spread(self, force, cloud, recoil) -> np.ndarray:
+        return np.concatenate(
+            [np.full(3 * FORCES, force), np.full(2 * BINS, np.hypot(cloud, recoil))]
+        )
 
     def expanded(self):
         recording = object.__new__(Likelihood)

@@ -66,20 +66,18 @@ def test_what_moves_a_whole_picture_of_the_recoil_counts_as_one_error(first) -> 
     count = len(weight) - 2 * len(seen.picture)
     picture = seen.picture[seen.recoils][0]
     bins = np.flatnonzero(seen.picture == picture)
-    gone = seen.travelled()[bins[0]]
+    travelled = seen.travelled()[bins[0]]
     for signs, repeated in ((1.0, np.sqrt(len(bins))), ((-1.0) ** np.arange(len(bins)), 1.0)):
-        left = np.zeros_like(expansion.residual)
-        left[count + bins] = 2e-3 * signs * weight[count + bins]
-        discrepancy = replace(expansion, residual=left).recoil_discrepancy
-        assert discrepancy == pytest.approx(2e-3 / gone * repeated, rel=0.25)
+        residual = np.zeros_like(expansion.residual)
+        residual[count + bins] = 2e-3 * signs * weight[count + bins]
+        discrepancy = replace(expansion, residual=residual).recoil_discrepancy
+        assert discrepancy == pytest.approx(2e-3 / travelled * repeated, rel=0.25)
         wider = (
-            first.recordings[0].with_wider_tolerances(replace(expansion, residual=left)).tolerances
+            first.recordings[0]
+            .with_wider_tolerances(replace(expansion, residual=residual))
+            .tolerances
         )
         assert wider.recoil == max(first.recordings[0].tolerances.recoil, discrepancy)
-
-
-def told_of(result) -> dict:
-    return confidence.confidence(result)
 
 
 def test_the_truth_is_found_where_no_prior_pulls(exact, monkeypatch):
@@ -118,7 +116,7 @@ def test_samples_lie_on_both_sides_of_the_truth_and_two_recordings_narrow_them(f
 
 
 def test_alike_recordings_agree(both):
-    summary = told_of(both)
+    summary = confidence.confidence(both)
     assert summary["disagreement"] == both.birge == 1.0
     assert len(summary["recordings"]) == 2 and "without_it" in summary["recordings"][0]
 
@@ -126,7 +124,7 @@ def test_alike_recordings_agree(both):
 def test_what_is_written_is_a_theta_file(first, tmp_path):
     path = tmp_path / "posterior.json"
     content = {"band": "known", **confidence.theta_entries(first)}
-    content["confidence"] = told_of(first)
+    content["confidence"] = confidence.confidence(first)
     content |= {"loss": dict.fromkeys(("geom", "force", "work", "total"), 1.0), "rollouts": 1}
     path.write_text(json.dumps(content, allow_nan=False))
     read = load_theta(path, "known")
@@ -163,7 +161,11 @@ def test_what_remains_at_the_mode_is_its_misfit(both):
 
 
 def test_samples_are_worth_many_and_said(first):
-    assert identify.SAMPLES / 4 < told_of(first)["effective_samples"] <= identify.SAMPLES + 1e-6
+    assert (
+        identify.SAMPLES / 4
+        < confidence.confidence(first)["effective_samples"]
+        <= identify.SAMPLES + 1e-6
+    )
 
 
 def test_constant_coordinates_correlate_with_nothing():
@@ -181,7 +183,7 @@ def test_constant_coordinates_correlate_with_nothing():
 def test_workers_change_no_byte(exact, first):
     again = found_of(exact[0], workers=1)
     np.testing.assert_array_equal(again.parameters.values, first.parameters.values)
-    assert json.dumps(told_of(again)) == json.dumps(told_of(first))
+    assert json.dumps(confidence.confidence(again)) == json.dumps(confidence.confidence(first))
 
 
 def test_residuals_at_the_truth_are_of_the_size_of_the_noise():
@@ -242,7 +244,7 @@ def test_pictures_count_by_time_and_by_the_measured_cloud(exact):
 
 
 @pytest.mark.slow
-def test_where_no_picture_of_the_drawn_band_counts_the_way_begins_at_the_hand(exact, first) -> None:
+def test_where_no_picture_of_the_drawn_band_counts_the_hand_says_where_it_was(exact, first) -> None:
     """A camera that drops most pictures: the recoil's discrepancy stays a finite share."""
     episode = exact[0]
     since = episode.cloud_time - episode.release_time
@@ -253,8 +255,8 @@ def test_where_no_picture_of_the_drawn_band_counts_the_way_begins_at_the_hand(ex
         clouds=[episode.clouds[number] for number in others],
     )
     (expansion,), (usual,) = found_of(few).fit.expansions, first.fit.expansions
-    gone, expected = (some.form.residuals.travelled().max() for some in (expansion, usual))
-    assert gone == pytest.approx(expected, abs=5e-3)
+    travelled, expected = (some.form.residuals.travelled().max() for some in (expansion, usual))
+    assert travelled == pytest.approx(expected, abs=5e-3)
     assert 0 < expansion.recoil_discrepancy < 1
 
 
@@ -272,6 +274,6 @@ def test_pictures_with_too_few_points_along_the_band_are_said_to_count_for_nothi
 
     few = replace(exact[0], clouds=[thinned(cloud) for cloud in exact[0].clouds])
     result = found_of(few)
-    assert told_of(result)["recordings"][0]["pictures"] == []
+    assert confidence.confidence(result)["recordings"][0]["pictures"] == []
     (line,) = capsys.readouterr().err.splitlines()
     assert "fewer than 4 points in each of 16 parts of the band, so its force alone" in line

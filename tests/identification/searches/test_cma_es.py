@@ -54,14 +54,6 @@ def test_solvers_side_by_side_learn_their_own_losses() -> None:
     assert not np.array_equal(both.unit[~first], other.unit[~first])
 
 
-def test_the_budget_is_spent_whatever_the_number_of_solvers() -> None:
-    for rollouts in (1, 15, 16, 17, 100):
-        table = searched(balls(0.3, 0.7), Evaluate(rosenbrock, NAMES), rollouts, population=8).table
-        owner = np.tile(np.repeat([0, 1], 8), 7)[:rollouts]
-        assert table["solver"].to_pylist() == owner.tolist()
-        assert table["generation"].to_pylist() == [row // 16 for row in range(rollouts)]
-
-
 def test_it_goes_on_where_nothing_is_left_to_gain() -> None:
     """After convergence, and on a plain, CMA-ES asks on for points of the cube."""
     for matrix in (correlated(), np.zeros((5, 5))):

@@ -171,16 +171,6 @@ def test_an_optimiser_is_deterministic_and_spends_its_budget(torch_threads) -> N
             np.testing.assert_array_equal(runs[0].unit[:8], latin_hypercube(5, 8, 1))
 
 
-def test_a_history_without_rows_can_be_kept(tmp_path: Path) -> None:
-    """What a search of one phase leaves for the second one: the same columns."""
-    empty, full = Evaluations("toy", NAMES), alone("de", quadratic(CENTRE, np.eye(5)), 30)
-    empty.save(tmp_path / "empty.parquet")
-    full.save(tmp_path / "full.parquet")
-    loaded = Evaluations.load("toy", tmp_path / "full.parquet", tmp_path / "empty.parquet")
-    assert loaded.table.equals(full.table)
-    assert len(Evaluations.load("toy", tmp_path / "empty.parquet").total) == 0
-
-
 def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
     paths = tmp_path / "a.parquet", tmp_path / "b.parquet"
     for path, evaluations in zip(paths, chain(quadratic(CENTRE, VALLEY))[:2], strict=True):

@@ -54,7 +54,7 @@ docs: setup           # the pages as a site, build/site/index.html; broken links
 validate: setup       # slow campaigns, and tests by other engines and readers; results are committed
 	.venv/bin/pip install --disable-pip-version-check -q -e '.[dev,validation]' -c constraints.txt
 	.venv/bin/sling verify
-	.venv/bin/python -m pytest tests/validation/engines tests/validation/benchmarks tests/exporting tests/recording/masks \
+	.venv/bin/python -m pytest tests/validation/engines tests/validation/test_throughput.py tests/exporting tests/recording/masks \
 		tests/recording/test_kinematics.py tests/cli/preflight/test_pictures.py \
 		tests/rig/recorder/test_record.py
 	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation \

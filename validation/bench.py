@@ -11,7 +11,7 @@ from pipeline.params import load
 from sling2sim2real.base import errors
 from sling2sim2real.cli.command_line import Parser
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN, RUBBER
-from validation.benchmarks import throughput
+from validation import throughput
 from validation.environment import environment
 
 LAWS = NEO_HOOKEAN, RUBBER

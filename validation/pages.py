@@ -17,7 +17,6 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_text
 from sling2sim2real.recording.checks import CHECKS
 from validation import headline
-from validation.benchmarks import times
 from validation.campaigns import ablations, field, landings
 from validation.campaigns.runner import read
 from validation.reports import row
@@ -44,7 +43,6 @@ BLOCKS: dict[str, tuple[str, Callable[[], list[str]]]] = {  # by page: name of i
     ),
     "docs/paper.md": ("ablations", lambda: ablations.table(read(ROOT / ablations.LARGE))),
     "docs/recording.md": ("field", lambda: field.table(read(ROOT / field.REPORT))),
-    "docs/times.md": ("times", lambda: times.table(read(ROOT / times.REPORT))),
 }
 
 

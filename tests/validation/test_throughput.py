@@ -13,7 +13,7 @@ from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
 from tests.project import DEFAULTS
 from validation import synthetic
-from validation.benchmarks import throughput as bench
+from validation import throughput as bench
 
 PARAMS = load(DEFAULTS)
 

@@ -1,1 +1,0 @@
-"""How fast: simulator, recordings, methods, other engines."""

@@ -55,6 +55,9 @@ class Entries(Mapping):
     def __len__(self) -> int:
         return len(self._entries)
 
+    def __ror__(self, first: dict) -> dict:
+        return {**first, **self}
+
 
 def noted(value: object, path: str) -> object:
     if isinstance(value, dict):

@@ -11,7 +11,7 @@ import numpy as np
 import sling2sim2real as s2s
 
 BAND = s2s.Band(mass=0.023, diameter=0.010, rest_length=0.52)  # kg, m, m
-TRUE = s2s.Theta(2.2e5, 0.47, 2.4e-3, 0.7, 0.6)
+TRUE = s2s.Theta(2.2e5, 0.47, 2.4e-3, 0.7, 0.6, law="corotated")  # the law of `paper`
 
 
 def narrowing(evaluate, dimension: int, *, rollouts: int, seed: int, population: int) -> None:

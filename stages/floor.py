@@ -39,7 +39,9 @@ def main() -> None:
                 file=sys.stderr,
             )
     write_json(Layout().floor(band), {"band": band, **floor})
-    print(f"{band}: floor {floor['mean_error_m']} m, {floor['failed']} launches failed")
+    error = floor["mean_error_m"]
+    mean = "no launch lands" if error is None else f"{100 * error:.2f} cm"
+    print(f"{band}: floor {mean}, {floor['failed']} launches failed")
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ BUDGETS = {  # what was reached on 2026-11-28, plus 2 %; the whole too
     "rig": 1_940,
     "validation": 6_980,
     "tests": 20_370,
-    "tools": 540,
+    "tools": 560,
     "examples": 525,
     "all": 56_180,
 }

@@ -20,15 +20,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 BUDGETS = {  # what was reached on 2026-11-28, plus 2 %; the whole too
-    "pipeline": 3_270,
-    "sling2sim2real": 22_050,
-    "stages": 495,
-    "rig": 1_940,
-    "validation": 6_980,
-    "tests": 20_370,
-    "tools": 560,
-    "examples": 525,
-    "all": 56_180,
+    "pipeline": 2_310,
+    "sling2sim2real": 21_060,
+    "stages": 490,
+    "rig": 1_950,
+    "validation": 6_480,
+    "tests": 19_950,
+    "tools": 570,
+    "examples": 530,
+    "all": 53_290,
 }
 COMMENTS = {  # by suffix: what is no code
     ".h": re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL),

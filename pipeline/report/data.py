@@ -183,11 +183,6 @@ def with_errors(trials: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def load_floor(path: Path) -> dict:
-    """Read what stages/floor.py wrote. Raises NotMade."""
-    return read_json(path, Floor).model_dump()
-
-
 def _unused(layout: Layout, band: str, methods: set[str]) -> int:
     launches = read_launches(layout.launches(band))
     return sum(launch.use == CHECK and launch.method not in {"", *methods} for launch in launches)

@@ -8,8 +8,7 @@ how many seconds the recording's hand drew the band, how long it waited [s], and
 had ever been drawn [m]. Where a stage wrote it, also "method", "nuisances": {"air_drag": ...},
 "turn_damping", "returned_share", "loss": {"geom", "force", "work", "total"}, "rollouts" and how
 many of them "failed", by which phase, generation and solver it was "found", "confidence";
-"mounted": false where the method leaves out the calibration of the clamps; "made_with": the
-settings of params.yaml that it rests on (params/provenance.py).
+"mounted": false where the method leaves out the calibration of the clamps.
 
 As much of "confidence" is modelled here as is read: a file edited by hand is refused in one line,
 not where it is used. What it rests on, samples of θ, lies beside in data/confidence/ with
@@ -159,7 +158,6 @@ class ThetaFile(JsonRecord):
     mounted: bool = True
     loss: dict[Name, float] = {}
     rollouts: Count = 0
-    made_with: dict[str, Any] = {}
     confidence: Confidence | None = None
 
     @model_validator(mode="after")

@@ -45,7 +45,7 @@ class Card(JsonRecord):
 
     training: Training
     landing_map: LandingMapErrors
-    made_with: dict[str, Any] | None = None  # settings of params.yaml (params/provenance.py)
+    made_with: dict[str, Any] | None = None  # settings of params.yaml (settings/provenance.py)
     projectile: Projectile | None = None  # of a policy that sees it
 
 

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from pipeline.report.data import load_floor
+from pipeline.report.data import Floor
 from rig.oracle.floor import errors_of, trial_numbers
 from sling2sim2real.base.errors import UserError
+from sling2sim2real.base.schema import read_json
 
 
 def test_numbers_begin_with_the_trials_own(params) -> None:
@@ -43,4 +44,4 @@ def test_a_floor_that_is_missing_or_damaged_is_named(tmp_path) -> None:
         if broken is not None:
             path.write_text(broken)
         with pytest.raises(UserError, match="band1.json: "):
-            load_floor(path)
+            read_json(path, Floor)

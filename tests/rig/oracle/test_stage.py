@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from pipeline.report.data import load_floor
+from pipeline.report.data import Floor
+from sling2sim2real.base.schema import read_json
 from stages import floor
 from tests.project import DEFAULTS
 
@@ -28,7 +29,7 @@ def run(tmp_path: Path, monkeypatch):
         content["setup"].update(setup)
         yaml.dump(content, tmp_path / "params.yaml")
         floor.main()
-        return load_floor(Path("data/floor/band1.json"))
+        return read_json(Path("data/floor/band1.json"), Floor).model_dump()
 
     return floor_of
 

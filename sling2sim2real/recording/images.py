@@ -24,10 +24,6 @@ class Undecodable(Exception):
     """An image that cannot be decoded; the message says why."""
 
 
-class Unsupported(Undecodable):
-    """An image of a kind that is not known, so all of its topic are undecodable."""
-
-
 @contextmanager
 def opened(data: np.ndarray) -> Iterator[Image.Image]:
     """A packed picture, whose header is read. Raises Undecodable, also of what is done with it."""
@@ -91,14 +87,14 @@ def color(picture: Picture) -> np.ndarray:
     """Decode a picture to BGR, shape (H, W, 3), uint8. Raises Undecodable."""
     if picture.format:
         if "compressedDepth" in picture.format:
-            raise Unsupported(f"format {picture.format!r} is depth, not colour")
+            raise Undecodable(f"format {picture.format!r} is depth, not colour")
         pixels = unpacked(picture.data, picture.format)
         if pixels.ndim == 3:
             return cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR)
         grey = pixels if pixels.dtype == np.uint8 else (pixels >> 8).astype(np.uint8)
         return cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
     if picture.encoding not in COLORS:
-        raise Unsupported(f"colour encoding {picture.encoding!r} is not known, use rgb8 or bgr8")
+        raise Undecodable(f"colour encoding {picture.encoding!r} is not known, use rgb8 or bgr8")
     channels, conversion = COLORS[picture.encoding]
     pixels = _rows(picture, np.uint8, channels)
     return np.ascontiguousarray(pixels) if conversion is None else cv2.cvtColor(pixels, conversion)
@@ -108,23 +104,23 @@ def depth(picture: Picture) -> np.ndarray:
     """Decode a picture to metres, shape (H, W), float32, 0 where unknown. Raises Undecodable."""
     if not picture.format:
         if picture.encoding not in DEPTHS:
-            raise Unsupported(f"depth encoding {picture.encoding!r} is not known, {USE}")
+            raise Undecodable(f"depth encoding {picture.encoding!r} is not known, {USE}")
         return _metres(_rows(picture, DEPTHS[picture.encoding], 1))
     floats = picture.format.startswith("32FC1")
     if "compressedDepth" not in picture.format:
         if floats:
-            raise Unsupported(f"depth format {picture.format!r} is not known, use compressedDepth")
+            raise Undecodable(f"depth format {picture.format!r} is not known, use compressedDepth")
         return _metres(unpacked(picture.data, picture.format))
     body = _body(picture.data)
     if len(body) == len(picture.data) and floats:
-        raise Unsupported(
+        raise Undecodable(
             f"depth format {picture.format!r} without the header of {DEPTH_HEADER.size} bytes that"
             " says how it is quantised: record the raw depth, or as 16UC1"
         )
     if not len(body):
         raise Undecodable("compressedDepth without a picture")
     if "rvl" in picture.format.lower():
-        raise Unsupported("compressedDepth in RVL is not read: record it in PNG")
+        raise Undecodable("compressedDepth in RVL is not read: record it in PNG")
     packed = unpacked(body, picture.format)
     if not floats:
         return _metres(packed)
@@ -189,9 +185,9 @@ def _rows(picture: Picture, kind: type, channels: int) -> np.ndarray:
 def _metres(depth: np.ndarray) -> np.ndarray:
     """Integers of 16 bits hold millimetres, floats hold metres."""
     if depth.ndim != 2:
-        raise Unsupported("a picture in colour is no depth image")
+        raise Undecodable("a picture in colour is no depth image")
     if depth.dtype == np.uint16:
         return depth.astype(np.float32) / 1000
     if depth.dtype != np.float32:
-        raise Unsupported(f"depth image of {depth.dtype}, {USE}")
+        raise Undecodable(f"depth image of {depth.dtype}, {USE}")
     return np.where(np.isfinite(depth) & (depth > 0) & (depth < FARTHEST), depth, np.float32(0))

@@ -339,11 +339,10 @@ def _joints(topic: Topic, names: tuple[str, ...], frame: str | None = None) -> M
     return _mapped(topic, "joints", read)
 
 
-def _joint_names(topic: Topic) -> list[tuple[str, ...]]:
-    """Names in the first messages, the most frequent first. Raises UserError if there are none."""
+def _joint_names(topic: Topic) -> list[str]:
+    """Joints in the first messages, of all who publish. Raises UserError if there are none."""
     some = Choice(topic, _all(topic, "joints")).readings[:JOINT_TRIES]
-    counts = Counter(tuple(reading.value) for reading in some)
-    names = [some for some, _ in counts.most_common() if some]
+    names = [*dict.fromkeys(name for reading in some for name in reading.value)]
     if not names:
         raise UserError(f"{topic.name} has fewer than two readable messages (no positions)")
     return names
@@ -365,14 +364,14 @@ def _pictures(role: str, topic: Topic, named: bool) -> Choice | None:
 
 def _gripper(topic: Topic, named: bool) -> Choice | None:
     """The joints of a gripper, not of an arm; all joints where params name the topic."""
-    for names in _joint_names(topic):
-        fingers = tuple(filter(_is_finger, names))
-        if fingers or named or _is_finger(topic.name):
-            only = tuple(name for name in fingers if "finger" in name.lower())
-            moving = only or fingers or names
-            convert = partial(opening_of, topic=topic.name, names=moving)
-            return Choice(topic, _joints(topic, moving), convert=convert)
-    return None
+    names = _joint_names(topic)
+    fingers = [name for name in names if _is_finger(name)]
+    if not fingers and not named and not _is_finger(topic.name):
+        return None
+    only = [name for name in fingers if "finger" in name.lower()]
+    moving = tuple(only or fingers or names)
+    convert = partial(opening_of, topic=topic.name, names=moving)
+    return Choice(topic, _joints(topic, moving), convert=convert)
 
 
 def opening_of(values: np.ndarray, topic: str, names: tuple[str, ...]) -> np.ndarray:
@@ -395,23 +394,20 @@ def opening_of(values: np.ndarray, topic: str, names: tuple[str, ...]) -> np.nda
 
 def _arm(topic: Topic, setup: SetupParams) -> Choice:
     """Joint states through params' URDF."""
-    joint_names = _joint_names(topic)
-    arms = [some for some in joint_names if not all(map(_is_finger, some))]
-    if not arms:
+    names = [name for name in _joint_names(topic) if not _is_finger(name)]
+    if not names:
         raise UserError(f"{topic.name} has the joints of fingers alone")
-    names = arms[0]
-    has = ", ".join(names[:SHOWN])
+    has = few(names, SHOWN)
     if setup.urdf is None:
         raise UserError(
             f"{topic.name} has the joints {has}: put the robot's URDF into robots/ and name it in"
             " setup.urdf"
         )
     chain = chain_of(setup.urdf, setup.tip_link)
-    if not any(set(chain.names) <= set(some) for some in joint_names):
-        lacks = ", ".join([name for name in chain.names if name not in names][:SHOWN])
+    if lacks := [name for name in chain.names if name not in names]:
         raise UserError(
-            f"{topic.name} lacks joint {lacks} of {setup.urdf}, it has {has}: check setup.urdf and"
-            " setup.tip_link"
+            f"{topic.name} lacks joint {few(lacks, SHOWN)} of {setup.urdf}, it has {has}: check"
+            " setup.urdf and setup.tip_link"
         )
     return Choice(topic, _joints(topic, chain.names, chain.root), convert=chain.poses)
 
@@ -472,17 +468,15 @@ def _size(image: Choice) -> tuple[int, int] | None:
 
 def _undecodable(role: str, choice: Choice) -> str | None:
     """Why none of some pictures of a topic can be decoded; None where one can."""
-    pictures, reasons = choice.readings, Counter()
+    pictures, reasons = choice.readings, []
     for k in np.unique(np.linspace(0, len(pictures) - 1, TRIES).astype(int)):
         try:
             getattr(images, role)(pictures[k].value)
-        except images.Unsupported as error:
-            reasons[str(error)] += 1
         except images.Undecodable as error:
-            reasons[f"its {COLOUR[role]} pictures cannot be decoded: {error}"] += 1
+            reasons.append(str(error))
         else:
             return None
-    return reasons.most_common(1)[0][0]
+    return f"its {COLOUR[role]} pictures cannot be decoded: {reasons[0]}"
 
 
 def _source(topic: str) -> str:

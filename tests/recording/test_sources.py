@@ -230,7 +230,7 @@ def test_arm_and_gripper_that_share_a_topic(params, gantry) -> None:
     roles = chosen(params, wrench("/ft"), shared, urdf="gantry.urdf")
     pose, gripper = (roles[role].messages for role in ("pose", "gripper"))
     assert len(pose) == len(gripper) == COUNT and len(pose[0][1].value) == 6
-    assert gripper[1][1].value == tuple(gantry[1, :2])
+    assert sorted(gripper[1][1].value) == sorted(gantry[1, :2])
     assert isinstance(gripper[0][1], Unreadable) and gripper[0][1] == "joint left_finger is missing"
 
 

@@ -140,7 +140,7 @@ def rewarded(
 
 def draw_box(surface: Source) -> tuple[np.ndarray, np.ndarray]:
     """Centre and half size of the box of draws [m], each of shape (2,), float32."""
-    low, high = surface.low.astype(np.float32), surface.high.astype(np.float32)
+    low, high = (np.asarray(end, np.float32) for end in (surface.low, surface.high))
     return (low + high) / 2, (high - low) / 2
 
 

@@ -28,9 +28,7 @@ def test_a_split_bag_is_one_recording(whole, parts, params) -> None:
     """With /tf_static in its first part alone, by any of its parts, which are sorted by number."""
     wanted = read_recording(whole, params.setup)
     folder = parts[0].parent
-    assert (
-        read_recording(parts[0], params.setup).notes[0].startswith("all 11 parts")
-    )
+    assert read_recording(parts[0], params.setup).notes[0].startswith("all 11 parts")
     for given in (folder, parts[0], parts[10]):
         assert_same_recording(read_recording(given, params.setup), wanted)
         assert (parts_of(given), name_of(given)) == (parts, "my")

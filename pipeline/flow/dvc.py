@@ -21,7 +21,9 @@ import psutil
 from sling2sim2real.base.disk import with_disk
 from sling2sim2real.base.errors import UserError, one_line
 
-DVC = (sys.executable, "-P", "-m", "dvc", "--wait-for-lock")
+# Without looking for garbage, which is a sixth of a command: it parses dvc.lock and ends.
+MAIN = "import gc, sys; gc.disable(); from dvc.cli import main; sys.exit(main(sys.argv[1:]))"
+DVC = (sys.executable, "-P", "-c", MAIN, "--wait-for-lock")
 GRACE = 15.0  # s that interrupted stages and DVC have to end
 BEGINS = "Running stage"
 OF_DVC = re.compile(  # what it says of itself

@@ -72,7 +72,7 @@ class Settings(Section):
     policy: PolicyParams = Field(default_factory=PolicyParams)
     launch: LaunchParams = Field(default_factory=LaunchParams)
     trials: TrialsParams = Field(default_factory=TrialsParams)
-    bands: dict[Name, BandParams] = {}
+    bands: dict[str, BandParams] = {}  # a folder's name may have a hyphen
 
     @classmethod
     def default(cls, **changes: Mapping) -> Self:

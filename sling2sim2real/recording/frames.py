@@ -166,7 +166,7 @@ class EpisodeGeometry:
         return cls(
             content["base_frame"],
             Transform.of(content["base_to_fork"]),
-            Camera(**{**camera, **arrays}),
+            Camera(camera["width"], camera["height"], **arrays, frame=camera["frame"]),
             Transform.of(content["camera_to_fork"]),
         )
 

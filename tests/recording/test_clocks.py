@@ -181,25 +181,6 @@ def test_the_machine_clock_that_is_set_back_is_refused(tmp_path, params) -> None
         )
 
 
-def test_gaps_and_ends_are_said(tmp_path, params) -> None:
-    def lose(stamp: int, message) -> None:
-        if 0.8 <= (stamp - START) * 1e-9 < 0.9:
-            message.wrench.force.x = float("nan")
-
-    def outside(low: float, high: float):
-        return lambda stamp, message: not low < (stamp - START) * 1e-9 < high
-
-    gone = {"pose": outside(3.5, 9.0), "color": outside(1.0, 1.6), "gripper": outside(-1.0, 0.6)}
-    recording = read(tmp_path, params, change=edit(wrench=lose, **gone))
-    words = "\n".join(recording.losses)
-    assert "/ft/wrench: lost 50 not finite" in words
-    assert "/ft/wrench: gap of 0.102 s at 0.80 s" in words
-    assert "/arm/current_pose: stops 0.70 s before the others" in words
-    assert "/gripper/joint_states: starts 0.60 s after the others" in words
-    assert "/camera/color/compressed: gap of 0.667 s at 0.94 s" in words
-    assert recording.wrench.lost == 50 and np.isfinite(recording.wrench.values).all()
-
-
 def test_stamps_that_are_missing(tmp_path, params, good) -> None:
     def zero(part: int):
         def bare(stamp: int, message) -> None:

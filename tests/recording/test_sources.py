@@ -230,7 +230,7 @@ def test_arm_and_gripper_that_share_a_topic(params, gantry) -> None:
     roles = chosen(params, wrench("/ft"), shared, urdf="gantry.urdf")
     pose, gripper = (roles[role].messages for role in ("pose", "gripper"))
     assert len(pose) == len(gripper) == COUNT and len(pose[0][1].value) == 6
-    assert gripper[1][1].value == tuple(gantry[1, :2])
+    assert sorted(gripper[1][1].value) == sorted(gantry[1, :2])
     assert isinstance(gripper[0][1], Unreadable) and gripper[0][1] == "joint left_finger is missing"
 
 
@@ -239,7 +239,7 @@ def test_arm_and_gripper_that_share_a_topic(params, gantry) -> None:
     [
         (joints("/js", ["j1", "j2"], PLACES[:, :2]), {}, "joints j1, j2: put the robot's URDF"),
         (joints("/js", ["x", "y"], PLACES[:, :2]), GANTRY_URDF, "/js lacks joint z, rz, ry, rx of"),
-        (joints("/js", ["finger"], PLACES[:, :1]), {}, "the file has .*/js .JointState"),
+        (joints("/js", ["finger"], PLACES[:, :1]), {}, "/js has the joints of fingers alone"),
         (joints("/js", ["x"], PLACES[:, :1]), {"urdf": "no.urdf"}, "no.urdf: cannot be read"),
     ],
 )

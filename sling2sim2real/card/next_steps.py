@@ -100,8 +100,8 @@ def _gains(
     )
     if any(map(relaxing, episodes)):
         yield Gain(
-            "Pause longer before the release, because the force was still falling. With stiffness and"
-            " relaxation known exactly, {narrows} to {after}.",
+            "Pause longer before the release, because the force was still falling. With stiffness"
+            " and relaxation known exactly, {narrows} to {after}.",
             model.after(model.known(*PULL))[aim],
         )
     yield Gain(

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sling2sim2real.api.model import Model
-from sling2sim2real.episode.episode import Episode
 from sling2sim2real.exporting.export import write
 
 
@@ -26,7 +25,7 @@ class Exported:
     card: dict
 
 
-def export(model: Model, to: str, out: str | Path, *, episode: Episode | None = None) -> Exported:
+def export(model: Model, to: str, out: str | Path) -> Exported:
     """Write a band for another engine into a folder, with a card that says what came out.
 
     Its parameters are matched to this simulation: the same force to hold a draw, the same landings.
@@ -46,11 +45,10 @@ def export(model: Model, to: str, out: str | Path, *, episode: Episode | None = 
         to: `mjcf` for MuJoCo; `newton` for Newton, which must be installed (extra `export`); `usd`
             for PhysX, to be matched there.
         out: Folder; what an export wrote there before is replaced.
-        episode: Whose pull is compared in both; None: a planned one.
 
     Raises:
         UserError: No such target, what it needs is missing, the folder holds something else, or
             the band cannot be matched.
     """
-    card = write(model, to, Path(out), episode)  # pyright: ignore[reportArgumentType]
+    card = write(model, to, Path(out))  # pyright: ignore[reportArgumentType]
     return Exported(Path(out), card.get("met"), card)

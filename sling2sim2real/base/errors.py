@@ -63,7 +63,7 @@ def _whose(path: str) -> str:
 
 # What extras of pyproject.toml bring, as it is imported.
 EXTRAS = {
-    "run": "botorch dvc fastapi gpytorch networkx numba onnx onnxscript prefect psutil"
+    "run": "botorch dvc fastapi gpytorch gymnasium networkx numba onnx onnxscript prefect psutil"
     " rsl_rl sksundae tensordict torch",
     "cluster": "dask dask_jobqueue distributed",
 }

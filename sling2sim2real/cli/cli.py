@@ -291,7 +291,7 @@ def export(arguments: argparse.Namespace) -> Done:
     folder = BandFolder.at(arguments.band)
     out = arguments.out or folder.path / "exports" / arguments.to
     expect_writable(out)
-    done = export(found, arguments.to, out, episode=folder.first_episode)
+    done = export(found, arguments.to, out)
     return kinds.shown(done.card, True) if arguments.json else shown(done.folder, done.card)
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import replacing_folder, write_json, write_text
 from sling2sim2real.base.machine import devices
-from sling2sim2real.episode.episode import Episode
 from sling2sim2real.exporting import ENGINES, card, mjcf, newton_replay, usd
 from sling2sim2real.exporting.band import CalibratedBand
 from sling2sim2real.exporting.chain import SpringChain
@@ -21,7 +20,7 @@ from sling2sim2real.exporting.mujoco_replay import MujocoBand
 from sling2sim2real.exporting.proof import Matched, proven
 
 
-def write(model: CalibratedBand, to: str, folder: Path, episode: Episode | None = None) -> dict:
+def write(model: CalibratedBand, to: str, folder: Path) -> dict:
     """What sling2sim2real.export does; what card.json holds. `to` is a key of TARGETS.
 
     Raises UserError.
@@ -31,7 +30,7 @@ def write(model: CalibratedBand, to: str, folder: Path, episode: Episode | None 
     if folder.exists() and not replaceable(folder):
         raise UserError(f"{folder}: holds something else than an export; name an empty folder")
     with replacing_folder(folder) as temporary:
-        content = TARGETS[to](model, temporary, episode)
+        content = TARGETS[to](model, temporary)
         write_json(temporary / "card.json", content)
     return content
 
@@ -50,16 +49,16 @@ def replaceable(folder: Path) -> bool:
     return there <= listed | {"card.json", "README.md"} and bool(listed)
 
 
-def to_mjcf(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
+def to_mjcf(model: CalibratedBand, folder: Path) -> dict:
     """The chain of mjcf.py, proven by a replay of the written file."""
     name, chain, proof = model.band.name, matched(model), proof_draws(model)
     path = folder / f"{name}.xml"
     write_text(path, mjcf.text(name, chain, _keys(chain, proof)))
-    done = proven(model, MujocoBand(chain, path), proof, episode)
+    done = proven(model, MujocoBand(chain, path), proof)
     return _chain_card(model, folder, "mjcf", done, {path.name: "the model"}, mjcf.VERSION)
 
 
-def to_newton(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
+def to_newton(model: CalibratedBand, folder: Path) -> dict:
     """<band>.json and newton_band.py, proven by a replay on the first device of SLING_DEVICE.
 
     The chain is matched in MuJoCo, which steps the same springs the same way. All that is said
@@ -70,7 +69,7 @@ def to_newton(model: CalibratedBand, folder: Path, episode: Episode | None) -> d
     path = folder / f"{name}.json"
     write_json(path, newton_replay.numbers(name, chain, proof))
     write_text(folder / source.name, source.read_text("utf-8"))
-    done = proven(model, newton_replay.NewtonReplay(chain, devices()[0]), proof, episode)
+    done = proven(model, newton_replay.NewtonReplay(chain, devices()[0]), proof)
     files = {path.name: "the numbers", source.name: "builds and launches the band"}
     return _chain_card(model, folder, "newton", done, files)
 
@@ -103,5 +102,5 @@ def _keys(chain: SpringChain, proof: np.ndarray) -> dict[str, dict[str, np.ndarr
     return keys
 
 
-Target = Callable[[CalibratedBand, Path, Episode | None], dict]
+Target = Callable[[CalibratedBand, Path], dict]
 TARGETS: dict[str, Target] = dict(zip(ENGINES, (to_mjcf, to_newton, usd.to_usd), strict=True))

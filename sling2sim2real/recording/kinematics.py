@@ -14,9 +14,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.transforms import is_tool
 
 FOLDER = Path("robots")
-TIPS = ("tcp", "ee", "hand_tcp")  # last words of a link that is taken as the tip
 TURNING, SLIDING = ("revolute", "continuous"), ("prismatic",)
 LEAST_AXIS = 1e-9
 
@@ -76,7 +76,7 @@ def chain_of(file: str, tip: str | None = None) -> Chain:
 
     Args:
         file: params.setup.urdf.
-        tip: params.setup.tip_link; None takes the one link named tcp, ee or hand_tcp.
+        tip: params.setup.tip_link; None takes the one link named like a tool.
 
     Raises:
         UserError: in one line, where it cannot be read or has no such link.
@@ -151,7 +151,7 @@ def _numbers(element: ElementTree.Element | None, key: str, default: str) -> np.
 
 
 def _tip(path: Path, links: list[str], parents: dict[str, Joint]) -> str:
-    named = [link for link in links if any(("_" + link.lower()).endswith("_" + t) for t in TIPS)]
+    named = [link for link in links if is_tool(link)]
     if len(named) != 1:
         ends = {joint.parent for joint in parents.values()}
         tips = named or [link for link in links if link not in ends]

@@ -142,18 +142,17 @@ def decoder(schema: Schema, encoding: str) -> Decoder:
     Raises:
         ValueError: where the encoding is not known or the schema is bad, in one line.
     """
-    by_name = encoding == "cdr" and _says_nothing(schema)
-    if not by_name and (schema.encoding, encoding) not in DECODERS:
+    make = DECODERS.get((schema.encoding, encoding))
+    if encoding == "cdr" and _says_nothing(schema):
+        make = _by_name
+    if make is None:
         supported = ", ".join(f"{a} with {b}" for a, b in DECODERS)
         what = f"schema {schema.encoding!r}" if schema.encoding else "no schema"
         raise ValueError(
             f"{what} with messages {encoding!r} cannot be read, record one of: {supported}"
         )
     try:
-        if by_name:
-            read = partial(_store().deserialize_cdr, typename=_standard_name(schema.name))
-        else:
-            read = _compiled(schema.encoding, encoding, schema.name, schema.data)
+        read = make(schema)
     except Exception as error:  # the parsers raise many kinds
         raise ValueError(f"bad schema {schema.name} ({Unreadable.by(error)})") from error
     return (lambda payload: read(_plain(payload))) if encoding == "cdr" else read
@@ -192,9 +191,8 @@ def _store() -> Typestore:
     return get_typestore(Stores.ROS2_HUMBLE)
 
 
-@lru_cache(64)
-def _compiled(kind: str, encoding: str, name: str, data: bytes) -> Decoder:
-    return DECODERS[kind, encoding](Schema(id=1, name=name, encoding=kind, data=data))
+def _by_name(schema: Schema) -> Decoder:
+    return partial(_store().deserialize_cdr, typename=_standard_name(schema.name))
 
 
 def _ros(schema: Schema) -> Decoder:

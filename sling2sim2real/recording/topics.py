@@ -20,7 +20,7 @@ from sling2sim2real.recording.camera import Camera, camera_from
 from sling2sim2real.recording.files import Container
 from sling2sim2real.recording.kinematics import chain_of
 from sling2sim2real.recording.messages import TYPES, Edge, Reading, Topic, Unreadable
-from sling2sim2real.recording.transforms import Transform, TransformTree
+from sling2sim2real.recording.transforms import Transform, TransformTree, is_tool
 from sling2sim2real.recording.words import few
 from sling2sim2real.settings.lab import SetupParams
 
@@ -34,7 +34,6 @@ OPTIONAL = ("gripper",)
 COMMANDS = ("goal", "desired", "command", "commanded", "cmd", "target", "reference", "setpoint")
 THINGS = ("camera", "object", "tag", "marker")
 COLOUR = {"color": "colour", "depth": "depth"}
-TOOLS = {"tcp", "ee", "end_effector"}  # words in the name of the frame that a pose is given for
 STILL = 1e-9  # m and quaternion: a transform that changes by more is no static one
 
 Convert = Callable[[np.ndarray], np.ndarray]
@@ -427,7 +426,7 @@ def _hand(topic: Topic, setup: SetupParams, still: TransformTree) -> Choice:
     some = Choice(topic, _all(topic, "transforms")).readings[:JOINT_TRIES]
     moving = {child: parent for reading in some for parent, child in reading.value}
     parents = still.parents | moving
-    tools = [name for name in parents if {*name.lower().split("_")} & TOOLS]
+    tools = filter(is_tool, parents)
     chains = []
     for tip in [setup.tip_link] if setup.tip_link in parents else sorted(tools):
         up = [tip]

@@ -61,7 +61,7 @@ ADDED = {
     "aim bands/toy --target 19": "--force, --json",
     OBSERVE: "--error 0.002, --check, --json",
     OBSERVE.replace("2.3", "2.2"): "--again",
-    EXPORT: "--out there, --json",
+    EXPORT: "--out there, --samples 2, --json",
 }
 CASES |= {
     f"{line.split()[0]} {option.split()[0].partition('=')[0]}": (line, f"{line} {option}")
@@ -138,8 +138,8 @@ def echo(patch: pytest.MonkeyPatch) -> None:
         message.to_json = lambda frames: json.dumps([repr(given[2:]), frames])
         return Look(message)
 
-    def export(found, to, out, episode) -> SimpleNamespace:
-        return SimpleNamespace(folder=out, card={"files": [str(to), str(out)]})
+    def export(found, to, out, samples) -> SimpleNamespace:
+        return SimpleNamespace(folder=out, card={"files": [str(to), str(out), f"{samples}"]})
 
     patch.setattr("sling2sim2real.cli.fit.fit", fit)
     patch.setattr("sling2sim2real.cli.observe.fit", lambda folder: None)

@@ -6,7 +6,7 @@ import os
 import platform
 from importlib.metadata import version
 
-from sling2sim2real.base.code import ROOT
+from pipeline.layout import ROOT
 from sling2sim2real.base.machine import commit, named, processor
 
 

@@ -25,7 +25,13 @@ class Exported:
     card: dict
 
 
-def export(model: Model, to: str, out: str | Path) -> Exported:
+def export(
+    model: Model,
+    to: str,
+    out: str | Path,
+    *,
+    samples: int = 0,
+) -> Exported:
     """Write a band for another engine into a folder, with a card that says what came out.
 
     Its parameters are matched to this simulation: the same force to hold a draw, the same landings.
@@ -45,10 +51,11 @@ def export(model: Model, to: str, out: str | Path) -> Exported:
         to: `mjcf` for MuJoCo; `newton` for Newton, which must be installed (extra `export`); `usd`
             for PhysX, to be matched there.
         out: Folder; what an export wrote there before is replaced.
+        samples: Of the posterior, as parameters of the engine in samples.parquet; not for `usd`.
 
     Raises:
-        UserError: No such target, what it needs is missing, the folder holds something else, or
-            the band cannot be matched.
+        UserError: No such target, what it needs is missing, the folder holds something else, the
+            band cannot be matched, or has fewer samples.
     """
-    card = write(model, to, Path(out))  # pyright: ignore[reportArgumentType]
+    card = write(model, to, Path(out), samples)  # pyright: ignore[reportArgumentType]
     return Exported(Path(out), card.get("met"), card)

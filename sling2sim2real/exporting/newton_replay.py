@@ -34,6 +34,13 @@ def numbers(name: str, chain: SpringChain, draws: np.ndarray) -> dict:
     }
 
 
+def sample(chain: SpringChain) -> dict[str, float]:
+    """What a sample changes of them."""
+    changed = "strength_n", "mooney_share", "damping_time_s", "time_step_s"
+    known = numbers("", chain, np.empty((0, 2)))
+    return {name: known[name] for name in changed}
+
+
 class NewtonReplay:
     """A chain in Newton. Raises UserError where Newton is not installed.
 

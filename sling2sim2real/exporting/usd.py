@@ -99,7 +99,7 @@ class UsdMatch:
         return within_limits(self.proof)
 
 
-def to_usd(model: CalibratedBand, folder: Path) -> dict:
+def to_usd(model: CalibratedBand, folder: Path, _: int) -> dict:
     """<band>.usda, nodes.json, and README.md: what it is, and what it is not."""
     draws, ours = near_draws(model)
     tension, stretch = SpringChain.tension(model, draws, ours.hold_force)

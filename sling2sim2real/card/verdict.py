@@ -214,7 +214,7 @@ def _identified(findings: Findings):
             "This method does not tell how sure its values are.",
             "Take the method `posterior`: it tells.",
         )
-    elif not findings.settled:
+    elif not (findings.settled or findings.at_sides):
         yield Reason(
             False,
             "The fit had not settled when it ended, so values and intervals may still move.",
@@ -270,8 +270,8 @@ def _identified(findings: Findings):
         yield Reason(
             False,
             f"The value of {label} is at the {side}; the true one may lie beyond.",
-            f"Check mass, diameter and rest length of the band, else widen the box of {label}"
-            " (`settings`).",
+            "Check the force sensor's frame and zero, and mass, diameter and rest length of the"
+            f" band; else widen the box of {label} (`settings`).",
         )
 
 

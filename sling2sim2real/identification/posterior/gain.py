@@ -15,7 +15,7 @@ import numpy as np
 from sling2sim2real.base.parameters import TABLE, Parameter
 from sling2sim2real.identification.posterior.coordinates import DAMPING
 
-HALF_NORMAL_VARIANCE = 1 - 2 / np.pi  # its variance, of a normal's
+RECTIFIED_VARIANCE = 1 / 2 - 1 / (2 * np.pi)  # of a Gaussian's that is 0 below its mean
 EVEN_VARIANCE = 1 / 12  # of a range
 LEAST_RANGE = 1e-9  # of a column that the samples vary
 
@@ -118,7 +118,7 @@ class LandingModel:
                 direction[self.names.index("youngs_modulus")] = 0.5
             if row.coordinate.prior:
                 variance = row.coordinate.prior[1] ** 2
-                variance *= HALF_NORMAL_VARIANCE if row.coordinate.half else 1.0
+                variance *= RECTIFIED_VARIANCE if row.coordinate.rectified else 1.0
             elif row.coordinate.bounds:
                 variance = EVEN_VARIANCE * np.ptp(row.coordinate.bounds) ** 2
             else:  # within a method's box

@@ -124,7 +124,7 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         label="Mooney share",
         symbol="Mooney share",
         reach=(-1.0, 1.0),
-        box=(-0.3, 0.9),
+        box=(-1.0, 0.9),
         law=RUBBER,
         coordinate=Coordinate(0.02),
     ),

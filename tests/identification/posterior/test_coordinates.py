@@ -104,7 +104,7 @@ def test_priors_are_even_or_as_published():
     low, high = OURS.prior(0.9)
     place = OURS.names.index
     i = place("mooney_share")
-    assert (low[i], high[i]) == pytest.approx((-0.3 + 0.05 * 1.2, 0.9 - 0.05 * 1.2))
+    assert (low[i], high[i]) == pytest.approx((-1.0 + 0.05 * 1.9, 0.9 - 0.05 * 1.9))
     i = place("log_loss_factor")
     np.testing.assert_allclose(np.pi * np.exp([low[i], high[i]]), TAN_DELTA, rtol=1e-3)
     i = place("softening")

@@ -242,7 +242,7 @@ def doubts(run: Run) -> list[str]:
             wrong.append("the policy did **not** converge in its own simulator.")
         if edges := known.get("edges"):
             sides = " and ".join(f"{name} at the {side}" for name, side in edges.items())
-            wrong.append(f"{sides} edge of its box: what is beyond may be true.")
+            wrong.append(f"{sides} end of its bounds: the true value may lie outside.")
         elif not known.get("settled", True):
             steps = known.get("steps", "all its")
             wrong.append(

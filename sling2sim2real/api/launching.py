@@ -283,7 +283,7 @@ def _hazards(
     elif edges := confidence.get("edges"):
         name, side = next(iter(edges.items()))
         what = (
-            f"{QUANTITIES[name].label} is at the {side} edge of its box: do not trust the interval"
+            f"{QUANTITIES[name].label} is at the {side} end of its bounds: do not trust the interval"
         )
         yield Hazard("confidence", what)
     elif not confidence.get("settled"):

@@ -144,6 +144,6 @@ def _at_sides(inputs: CardInputs) -> list[tuple[str, str]]:
     for name, side in at_edges(inputs.params, inputs.method, theta).items():
         quantity, box = QUANTITIES[name], ranges[name]
         low, high = (f"{rounded(quantity.factor * x):.6g}" for x in (box.low, box.high))
-        words = f"{side} side of its box, {low} to {high} {quantity.unit}".strip()
+        words = f"{side} end of its bounds, {low} to {high} {quantity.unit}".strip()
         at_sides.append((quantity.label, words))
     return at_sides

@@ -279,6 +279,13 @@ def observe(arguments: argparse.Namespace) -> Done:
         help="MuJoCo's XML (or: mujoco), numbers and a loader for Newton, PhysX's USD (or: physx)",
     ),
     flag("--out", type=Path, metavar="FOLDER", help="default exports/<target> in its folder"),
+    flag(
+        "--samples",
+        type=int,
+        default=0,
+        metavar="N",
+        help="also samples of the posterior as the engine's parameters, in samples.parquet",
+    ),
     JSON,
 )
 def export(arguments: argparse.Namespace) -> Done:
@@ -291,7 +298,7 @@ def export(arguments: argparse.Namespace) -> Done:
     folder = BandFolder.at(arguments.band)
     out = arguments.out or folder.path / "exports" / arguments.to
     expect_writable(out)
-    done = export(found, arguments.to, out, episode=folder.first_episode)
+    done = export(found, arguments.to, out, samples=arguments.samples)
     return kinds.shown(done.card, True) if arguments.json else shown(done.folder, done.card)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import (
@@ -69,7 +70,7 @@ def _axis(row: Parameter) -> Any:
     kind = create_model(row.name, __base__=Box, low=bound, high=bound)
     kind.scale = row.scale
     low, high = row.box
-    return kind, kind(low=low, high=high)
+    return kind, Field(default_factory=partial(kind, low=low, high=high))
 
 
 _BOXES = {row.name: _axis(row) for row in parameters("neo_hookean") if row.name in THETA}
@@ -165,7 +166,7 @@ class MethodDefaults(Section):
     k_top: KTop | None = None
     mounting: bool = True
     covariance: bool = True
-    weights: Weights = Weights()
+    weights: Weights = Field(default_factory=Weights)
 
 
 class MethodParams(MethodDefaults):
@@ -209,14 +210,11 @@ class MethodParams(MethodDefaults):
         return self
 
 
-METHODS = {
-    PAPER: MethodParams(),  # the paper's
-    POSTERIOR: MethodParams(  # ours: the mode of one density over all recordings and launches
-        search=POSTERIOR,
-        law="rubber",
-        fixed={row.name: row.fixed for row in parameters("rubber") if row.fixed is not None},
-    ),
-}
+def default_methods() -> dict[str, MethodParams]:
+    """The paper's; and ours, the mode of one density over all recordings and launches."""
+    fixed = {row.name: row.fixed for row in parameters("rubber") if row.fixed is not None}
+    ours = MethodParams(search=POSTERIOR, law="rubber", fixed=fixed)
+    return {PAPER: MethodParams(), POSTERIOR: ours}
 
 
 def parameter_names(law: str) -> tuple[str, ...]:

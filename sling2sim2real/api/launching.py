@@ -282,10 +282,8 @@ def _hazards(
         yield Hazard("confidence", what)
     elif edges := confidence.get("edges"):
         name, side = next(iter(edges.items()))
-        what = (
-            f"{QUANTITIES[name].label} is at the {side} end of its bounds: do not trust the interval"
-        )
-        yield Hazard("confidence", what)
+        where = f"{QUANTITIES[name].label} is at the {side} end of its bounds"
+        yield Hazard("confidence", f"{where}: do not trust the interval")
     elif not confidence.get("settled"):
         yield Hazard("confidence", "the fit has not converged: do not trust the interval")
     elif (effective := confidence.get("effective_samples") or np.inf) < FEW_SAMPLES:

@@ -39,7 +39,9 @@ BLOCKS: dict[str, tuple[str, Callable[[], list[str]]]] = {  # by page: name of i
     "docs/reference/checks.md": ("checks", checks),
     "docs/identification.md": (
         "landings",
-        lambda: landings.table({s: read(ROOT / landings.report_of(s)) for s in landings.SETS}),
+        lambda: landings.table(
+            {name: read(ROOT / landings.report_of(name)) for name in ("bands", "sealed")}
+        ),
     ),
     "docs/paper.md": ("ablations", lambda: ablations.table(read(ROOT / ablations.LARGE))),
     "docs/recording.md": ("field", lambda: field.table(read(ROOT / field.REPORT))),

@@ -268,8 +268,8 @@ def _identified(findings: Findings):
         yield Reason(
             False,
             f"The fitted {label} is at the {side}. The true value may lie outside.",
-            "Check the force sensor's frame, mass, diameter and rest length. If they are right, widen"
-            f" the bounds of {label} (`settings`).",
+            "Check the force sensor's frame, mass, diameter and rest length. If they are right,"
+            f" widen the bounds of {label} (`settings`).",
         )
 
 

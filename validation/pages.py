@@ -11,8 +11,8 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from pipeline.layout import ROOT
 from sling2sim2real.base import errors
-from sling2sim2real.base.code import ROOT
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_text
 from sling2sim2real.recording.checks import CHECKS

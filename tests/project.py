@@ -9,7 +9,7 @@ from typing import Any
 import psutil
 from ruamel.yaml import YAML
 
-from sling2sim2real.base.code import ROOT
+from pipeline.layout import ROOT
 from validation.projects import DEFAULTS, environment, run_of, wait
 
 # What params.yaml has of a band of one's own.

@@ -158,13 +158,6 @@ def setup(arguments: argparse.Namespace) -> Done:
         default=kinds.PULLS[0],
         help="with plan.dips (the default), or without",
     ),
-    flag(
-        "--precondition",
-        type=kinds.count,
-        default=0,
-        metavar="N",
-        help="stretch the band to the draw so often first, in the same grasp",
-    ),
     flag("--pulls", type=kinds.count, default=1, metavar="N", help="in one recording; default 1"),
     flag("--out", type=Path, metavar="FOLDER", help="default plan/, in the band's folder"),
     flag("--rate", type=kinds.rate, default=100.0, metavar="HZ", help="of the CSV; default 100"),
@@ -182,7 +175,6 @@ def plan(arguments: argparse.Namespace) -> Done:
         found=known.found,
         draw=arguments.draw,
         pull=arguments.pull,
-        precondition=arguments.precondition,
         pulls=arguments.pulls,
     )
     files = plan.write(arguments.out or Path(arguments.band or ".", "plan"), arguments.rate)

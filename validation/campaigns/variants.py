@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ruamel.yaml import YAML
 
+from pipeline.layout import ROOT
 from pipeline.params import Params
-from sling2sim2real.base.code import ROOT
 from sling2sim2real.identification.search import rollouts_of
 from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN

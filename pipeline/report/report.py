@@ -240,7 +240,10 @@ def doubts(run: Run) -> list[str]:
             wrong.append(f"{lost.sum()} of {len(lost)} launches could not be predicted.")
         if not result.card["training"]["converged"]:
             wrong.append("the policy did **not** converge in its own simulator.")
-        if not known.get("settled", True):
+        if edges := known.get("edges"):
+            sides = " and ".join(f"{name} at the {side}" for name, side in edges.items())
+            wrong.append(f"{sides} end of its bounds: the true value may lie outside.")
+        elif not known.get("settled", True):
             steps = known.get("steps", "all its")
             wrong.append(
                 f"the fit had **not settled** after {steps} steps; do not rely on its intervals."

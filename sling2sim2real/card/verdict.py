@@ -212,7 +212,7 @@ def _identified(findings: Findings):
             "This method gives no uncertainty of its values.",
             "Use the method `posterior`, which gives intervals.",
         )
-    elif not findings.settled:
+    elif not (findings.settled or findings.at_sides):
         yield Reason(
             False,
             "The fit had not settled when it ended, so values and intervals may still move.",
@@ -268,8 +268,8 @@ def _identified(findings: Findings):
         yield Reason(
             False,
             f"The fitted {label} is at the {side}. The true value may lie outside.",
-            f"Check mass, diameter and rest length of the band. If they are right, widen the"
-            f" bounds of {label} (`settings`).",
+            "Check the force sensor's frame, mass, diameter and rest length. If they are right,"
+            f" widen the bounds of {label} (`settings`).",
         )
 
 

@@ -61,7 +61,7 @@ def test_a_stage_lists_the_code_that_it_runs(name: str) -> None:
 def test_every_script_is_a_stage_and_every_search_a_file() -> None:
     scripts = {module for module in GRAPH.modules if module.startswith("stages.")}
     assert scripts == {"stages.start", *(f"stages.{name}" for name in STAGES)}
-    assert all((ROOT / SEARCH.format(name)).is_file() for name in (*SEARCHES[2:], OWN))
+    assert all((ROOT / SEARCH.format(name)).is_file() for name in (*[*SEARCHES][2:], OWN))
 
 
 def test_a_bands_folder_keeps_settings_that_its_stage_depends_on() -> None:

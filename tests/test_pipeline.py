@@ -15,12 +15,12 @@ import networkx
 import pytest
 from numba.core.caching import UserProvidedCacheLocator
 from ruamel.yaml import YAML
+from tools.closure import stages
 
 from pipeline.flow.dvc import graph_of
 from rig.physics import compiled
 from sling2sim2real.base.launches_file import write_launches
 from tests.project import BAND, ROOT, contents, until
-from tools.closure import stages
 from validation.projects import TINY, MarkedRun, ProjectCopy, copy_project, run_of
 
 pytestmark = pytest.mark.slow

@@ -17,7 +17,7 @@ from pipeline.params import load
 from sling2sim2real.api.exporting import export
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.machine import devices
+from sling2sim2real.base.machine import device
 from sling2sim2real.exporting.card import ASKED
 from validation.reports import write_report
 
@@ -38,8 +38,8 @@ def main() -> None:
     parser.add_argument("bands", nargs="*", metavar="RECORDING")
     args, cards = parser.parse_args(), {}
     target, (packages, arguments) = args.to, TARGETS[args.to]
-    device = {"mjcf": "cpu", "newton": devices()[0], "usd": "cuda:0"}[target]
-    name = f"{target}-gpu" if target == "newton" and device != "cpu" else target
+    place = {"mjcf": "cpu", "newton": device(), "usd": "cuda:0"}[target]
+    name = f"{target}-gpu" if target == "newton" and place != "cpu" else target
     path, bands = Path(REPORT.format(name)), args.bands or list(load().run.first)
     versions = {name: version(name) for name in packages}
     for band in bands:
@@ -51,7 +51,7 @@ def main() -> None:
             "met": len(cards) == len(bands) and all(row["met"] for row in cards.values()),
             "bands": cards,
         }
-        write_report(path, content, arguments, device=device, versions=versions)
+        write_report(path, content, arguments, device=place, versions=versions)
 
 
 def exported(target: str, band: str) -> dict:

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.machine import cores, devices
+from sling2sim2real.base.machine import cores, device
 from sling2sim2real.base.parameters import Parameter, parameters
 from sling2sim2real.base.schema import explained, read_json
 from sling2sim2real.identification.results.theta import Mounting, ThetaFile, parameters_of
@@ -240,7 +240,7 @@ class Model:
         law = self.theta.law
         parameters = self.theta.parameters if points is None else Parameters(law, points)
         return launch_many(
-            self.sling, self.launch_setup, parameters, draws, device=devices(), workers=cores()
+            self.sling, self.launch_setup, parameters, draws, device=device(), workers=cores()
         )
 
     def _history(self) -> LaunchHistory | None:

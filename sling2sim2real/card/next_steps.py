@@ -90,10 +90,6 @@ def _gains(
             model.after(model.known(DIP[0], spread=DIP[1]))[aim],
         )
     yield Gain(
-        "Record another pull of the same kind: {narrows} to about {after}.",
-        model.after(model.pulled(len(episodes)))[aim],
-    )
-    yield Gain(
         "Record more pictures of the recoil, by a faster camera or by more pulls. With damping and"
         " drag known exactly, {narrows} to {after}.",
         model.after(model.known(*RECOIL))[aim],

@@ -12,7 +12,7 @@ import numpy as np
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import replacing_folder, write_json, write_text
-from sling2sim2real.base.machine import devices
+from sling2sim2real.base.machine import device
 from sling2sim2real.exporting import ENGINES, card, mjcf, newton_replay, samples, usd
 from sling2sim2real.exporting.band import CalibratedBand
 from sling2sim2real.exporting.chain import SpringChain
@@ -73,7 +73,7 @@ def to_mjcf(model: CalibratedBand, folder: Path, count: int) -> dict:
 
 
 def to_newton(model: CalibratedBand, folder: Path, count: int) -> dict:
-    """<band>.json and newton_band.py, proven by a replay on the first device of SLING_DEVICE.
+    """<band>.json and newton_band.py, proven by a replay on the device of SLING_DEVICE.
 
     The chain is matched in MuJoCo, which steps the same springs the same way. All that is said
     about it is measured in Newton.
@@ -83,7 +83,7 @@ def to_newton(model: CalibratedBand, folder: Path, count: int) -> dict:
     path = folder / f"{name}.json"
     write_json(path, newton_replay.numbers(name, chain, proof))
     write_text(folder / source.name, source.read_text("utf-8"))
-    replay = partial(newton_replay.NewtonReplay, device=devices()[0])
+    replay = partial(newton_replay.NewtonReplay, device=device())
     done = proven(model, replay(chain), proof)
     sampled = samples.write(
         model, chain, folder, count, replay=replay, columns=newton_replay.sample, proof=proof

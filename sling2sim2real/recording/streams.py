@@ -36,7 +36,7 @@ from sling2sim2real.recording.topics import (
     transforms_of,
 )
 from sling2sim2real.recording.transforms import TransformTree
-from sling2sim2real.recording.words import counted, shortened
+from sling2sim2real.recording.words import shortened
 from sling2sim2real.settings.lab import SetupParams
 from sling2sim2real.settings.recording import DelayParams
 
@@ -349,22 +349,12 @@ def _read(role: str, choice: Choice) -> tuple[_Raw, str]:
 
 def _stream_of(role: str, choice: Choice, late: float) -> tuple[Stream[Any], np.ndarray]:
     """One topic, sorted, and its times of receipt [ns]. Raises UserError where it is of no use."""
-    (raw, frame), notes, hold = _read(role, choice), [], None
+    (raw, frame), even, hold = _read(role, choice), None, None
     _expect_forward(raw)
     raw.drop(_outliers(raw.stamp), "far off in time")
-    disorder = int(np.count_nonzero(np.diff(raw.stamp) < 0))
-    numbers = role not in CAMERAS
-    even = pace.without_bursts(raw.topic, raw.stamp, raw.log, raw.values) if numbers else None
-    if even:
-        raw.stamp, bursts = even
-        every = 1e-6 * bursts.interval
-        notes.append(
-            f"stamped in bursts of {bursts.count} every {every:.3g} ms: spread evenly over the time"
-            " before each"
-        )
-    elif disorder:
-        notes.append(f"{counted(disorder)} out of order, sorted by stamp")
-    raw.stamp = raw.stamp - round(late * 1e9)
+    if role not in CAMERAS:
+        even = pace.without_bursts(raw.topic, raw.stamp, raw.log, raw.values)
+    raw.stamp = (even[0] if even else raw.stamp) - round(late * 1e9)
     raw.keep(np.argsort(raw.stamp, kind="stable"))
     raw.drop(np.diff(raw.stamp, prepend=raw.stamp[0] - 1) == 0, "with the stamp of another")
     if role in LONE and choice.convert is None:
@@ -372,12 +362,7 @@ def _stream_of(role: str, choice: Choice, late: float) -> tuple[Stream[Any], np.
     if choice.convert is not None:
         raw.values = choice.convert(raw.values)
     if role in LONE and (hold := pace.hold_of(raw.stamp, raw.values)):
-        retained = pace.first_of_each(raw.stamp, raw.values, hold)
-        times = f"{len(retained) / np.count_nonzero(retained):.0f}"
-        notes.append(f"each value is sent {times} times: the repeats are left out")
-        raw.keep(retained)
-    if raw.lost:
-        notes.append(f"lost {raw.words()}")
+        raw.keep(pace.first_of_each(raw.stamp, raw.values, hold))
     stream = Stream(
         topic=raw.topic,
         frame=frame,
@@ -385,7 +370,7 @@ def _stream_of(role: str, choice: Choice, late: float) -> tuple[Stream[Any], np.
         values=raw.values,
         receipt_delay=float(np.median(raw.log - raw.stamp) * 1e-9),
         lost=sum(raw.lost.values()),
-        notes=notes,
+        notes=[f"lost {raw.words()}"] if raw.lost else [],
         bursts=even and even[1],
         hold=1e-9 * (hold or 0.0),
     )

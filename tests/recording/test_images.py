@@ -42,35 +42,21 @@ def png(image: np.ndarray) -> bytes:
     return cv2.imencode(".png", image)[1].tobytes()
 
 
-@st.composite
-def arrays(draw, kind, channels: int = 1):
-    height, width = draw(st.integers(1, 9)), draw(st.integers(1, 9))
-    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    shape = (height, width, channels) if channels > 1 else (height, width)
-    if np.issubdtype(kind, np.floating):
-        return random.uniform(0.1, 5, shape).astype(kind)
-    return random.integers(0, np.iinfo(kind).max + 1, shape).astype(kind)
-
-
-@given(arrays(np.uint8, 3), st.integers(0, 7))
-def test_raw_colors(bgr, padding) -> None:
-    alpha, rgb = np.full_like(bgr[..., :1], 7), bgr[..., ::-1]
-    grey = np.repeat(bgr[..., :1], 3, axis=2)
+@pytest.mark.parametrize("padding", [0, 7])
+def test_raw_pictures(padding) -> None:
+    alpha, grey = np.full_like(BGR[..., :1], 7), np.repeat(BGR[..., :1], 3, axis=2)
     for encoding, pixels, wanted in (
-        ("bgr8", bgr, bgr),
-        ("rgb8", rgb, bgr),
-        ("bgra8", np.concatenate([bgr, alpha], axis=-1), bgr),
-        ("rgba8", np.concatenate([rgb, alpha], axis=-1), bgr),
-        ("mono8", bgr[..., 0], grey),
+        ("bgr8", BGR, BGR),
+        ("rgb8", BGR[..., ::-1], BGR),
+        ("bgra8", np.concatenate([BGR, alpha], axis=-1), BGR),
+        ("rgba8", np.concatenate([BGR[..., ::-1], alpha], axis=-1), BGR),
+        ("mono8", BGR[..., 0], grey),
     ):
         np.testing.assert_array_equal(color(raw(encoding, pixels, padding)), wanted)
-
-
-@given(arrays(np.uint16), arrays(np.float32), st.integers(0, 7), st.booleans())
-def test_raw_depth(pixels, metres, padding, swapped) -> None:
-    millimetres = depth(raw("16UC1", pixels, padding, swapped))
-    np.testing.assert_allclose(millimetres, pixels / 1000, rtol=1e-6)
-    np.testing.assert_array_equal(depth(raw("32FC1", metres, padding, swapped)), metres)
+    for swapped in (False, True):
+        millimetres = depth(raw("16UC1", MILLIMETRES, padding, swapped))
+        np.testing.assert_allclose(millimetres, MILLIMETRES / 1000, rtol=1e-6)
+        np.testing.assert_array_equal(depth(raw("32FC1", DEPTH, padding, swapped)), DEPTH)
 
 
 def test_unknown_depth_is_zero() -> None:
@@ -130,22 +116,19 @@ def test_quantised_depth_as_image_transport_writes_it() -> None:
 @given(st.integers(0, 2**32 - 1))
 def test_mutated_pictures_are_pictures_or_undecodable(seed) -> None:
     random = np.random.default_rng(seed)
-    frame = np.full((24, 32), 900, np.uint16)
-    jpeg = cv2.imencode(".jpg", np.full((24, 32, 3), 90, np.uint8))[1].tobytes()
+    packed_depth = bytes(12) + png(np.full((24, 32), 900, np.uint16))
     for read, format, content in (
-        (depth, "16UC1; compressedDepth png", bytes(12) + png(frame)),
-        (depth, "32FC1; compressedDepth png", bytes(12) + png(frame)),
-        (color, "jpeg", jpeg),
+        (depth, "16UC1; compressedDepth png", packed_depth),
+        (depth, "32FC1; compressedDepth png", packed_depth),
+        (color, "jpeg", JPEG),
     ):
         data = np.frombuffer(content, np.uint8).copy()
         data[random.integers(len(data), size=2)] = random.integers(256, size=2)
         data = data[: random.integers(len(data) + 1)] if seed % 2 else data
         try:
-            result = read(Picture("", format, data))
+            assert read(Picture("", format, data)).ndim in (2, 3)
         except Undecodable as error:
             assert "\n" not in str(error)
-        else:
-            assert result.ndim in (2, 3)
 
 
 JPEG = cv2.imencode(".jpg", np.full((64, 64, 3), 90, np.uint8))[1].tobytes()

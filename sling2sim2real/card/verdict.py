@@ -40,7 +40,7 @@ SHARED, SURE, SHARE = 5, 0.05, 1 / 3
 _LEVEL = f"{100 * LEVEL:.0f} %"
 # Of the weight on the hand: bending makes it a fifth heavier on sound recordings.
 CARRIED = 1.5
-RUBBER = 900, 1300  # kg/m^3 of solid natural, silicone and latex rubber
+SOLID_RUBBER = 900, 1300  # kg/m^3 of solid natural, silicone and latex rubber
 # What is wrong where several of force, hand and recoil are missed.
 SIZES = (
     "Weigh and measure the band again. Where force, drawn band and recoil are all off, its mass,"
@@ -149,7 +149,7 @@ def judge(findings: Findings) -> tuple[str, list[Reason]]:
 
 def question(findings: Findings) -> str:
     """What to ask of a band whose mass and size are not those of solid rubber; else ""."""
-    low, high = RUBBER
+    low, high = SOLID_RUBBER
     if findings.density is None or low <= findings.density <= high:
         return ""
     return (

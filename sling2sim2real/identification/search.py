@@ -3,12 +3,12 @@
 A search is a function `search(evaluate, dimension, *, rollouts, seed, population, **settings)`. It
 knows only the unit cube of the axes that are free, and calls `evaluate(points) -> losses` with
 batches of any size; everything that it evaluates is kept, so it returns nothing. Ours lie in
-searches/; params.yaml names one of a user's own as `package.module:function`.
+searches/, and settings/identification.py names them; params.yaml names one of a user's own as
+`package.module:function`.
 """
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from typing import Protocol
 
@@ -20,16 +20,7 @@ from sling2sim2real.identification.objective.box import SearchBox, latin_hypercu
 from sling2sim2real.identification.objective.evaluate import Evaluation
 from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.settings import Settings
-from sling2sim2real.settings.identification import POSTERIOR
-
-FOLDER = "sling2sim2real.identification.searches"
-OURS = {  # what their rows are called, and where they are
-    "multistart": ("de", f"{FOLDER}.de:differential_evolution"),
-    POSTERIOR: ("design", f"{__name__}:design"),
-    "de": ("de", f"{FOLDER}.de:differential_evolution"),
-    "bo": ("bo", f"{FOLDER}.bo:bayesian"),
-    "adam": ("adam", f"{FOLDER}.adam:adam"),
-}
+from sling2sim2real.settings.identification import POSTERIOR, SEARCHES
 
 
 class Evaluate(Protocol):
@@ -141,9 +132,10 @@ def explore(
     settings = {"rollouts": rollouts, "seed": optimizer.seed, "population": optimizer.population}
     if name in ("multistart", "de"):
         settings |= {"mutation": optimizer.mutation, "recombination": optimizer.recombination}
-    call = bound(search, name, len(box.free), **settings | method_params.settings)
+    settings |= method_params.settings
+    started = lambda losses_of: search(losses_of, len(box.free), **settings)  # noqa: E731
     try:
-        run(call, evaluate, evaluations, phase=phase, rollouts=rollouts, box=box)
+        run(started, evaluate, evaluations, phase=phase, rollouts=rollouts, box=box)
     except (TypeError, ValueError) as error:
         if len(evaluations.total):
             raise
@@ -164,25 +156,11 @@ def function_of(name: str) -> tuple[str, Callable[..., None]]:
     Raises:
         UserError: There is no such function.
     """
-    phase, place = OURS.get(name, (name.rpartition(":")[2], name))
+    phase, place = SEARCHES.get(name, (name.rpartition(":")[2], name))
     try:
         return phase, imported(place)
     except Exception as error:  # a module of the user's may raise anything
         raise _refusal(name, f"cannot be imported ({type(error).__name__}: {error})") from error
-
-
-def bound(
-    search: Callable[..., None], name: str, dimension: int, /, **settings
-) -> Callable[[Evaluate], None]:
-    """The search with its settings. Raises UserError where it takes no such ones."""
-    try:
-        inspect.signature(search).bind(None, dimension, **settings)
-    except (TypeError, ValueError) as error:
-        names = ", ".join(settings)
-        raise _refusal(
-            name, f"cannot be called as function(evaluate, dimension, {names}): {error}"
-        ) from error
-    return lambda evaluate: search(evaluate, dimension, **settings)
 
 
 def _refusal(name: str, what: str) -> UserError:

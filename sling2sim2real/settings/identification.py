@@ -27,7 +27,14 @@ POSTERIOR, PAPER = "posterior", "paper"
 UNSEEN = tuple(  # what a pull does not show
     row.name for row in parameters("neo_hookean") if row.coordinate is None
 )
-SEARCHES = ("multistart", POSTERIOR, "de", "bo", "adam")
+_FOLDER = "sling2sim2real.identification.searches"
+SEARCHES = {  # what the rows of each are called, and its function
+    "multistart": ("de", f"{_FOLDER}.de:differential_evolution"),
+    POSTERIOR: ("design", "sling2sim2real.identification.search:design"),
+    "de": ("de", f"{_FOLDER}.de:differential_evolution"),
+    "bo": ("bo", f"{_FOLDER}.bo:bayesian"),
+    "adam": ("adam", f"{_FOLDER}.adam:adam"),
+}
 OWN = "own"  # any other: a function of the user's
 OUR_ENGINE = "sling"
 ENGINES = OUR_ENGINE, "physx"
@@ -158,7 +165,7 @@ class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
     law: Law = "corotated"
-    search: Annotated[str, _one_of(SEARCHES, "function")] = "multistart"
+    search: Annotated[str, _one_of((*SEARCHES,), "function")] = "multistart"
     engine: Annotated[str, _one_of(ENGINES, "function")] = "sling"
     settings: dict[str, Setting] = {}
     fixed: dict[str, Value] = {}

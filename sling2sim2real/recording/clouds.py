@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -47,15 +46,7 @@ class Clouds:
         return sum(not len(points) for points in self.points)
 
 
-class Mask(Protocol):
-    """A backend that has learned from a view."""
-
-    def mask(self, frame: RgbdFrame) -> np.ndarray:
-        """Pixels of the band, shape (H, W), bool."""
-        ...
-
-
-def masker(name: str, view: View) -> Mask:
+def masker(name: str, view: View) -> RidgeMask | FolderMask:
     """The backend of params.cloud.mask. Raises UserError where its masks are missing."""
     return {"opencv": RidgeMask, "folder": FolderMask}[name](view)
 

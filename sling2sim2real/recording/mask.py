@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from scipy.ndimage import binary_closing, binary_dilation, gaussian_filter
 
-from sling2sim2real.recording.scene import RgbdFrame, Scene, View, length
+from sling2sim2real.recording.scene import BLIND, RgbdFrame, Scene, View, length
 
 VOXEL, HALF = 0.008, 30  # m, and voxels from the middle to each side
 REACH = VOXEL * HALF
@@ -196,7 +196,7 @@ class RidgeMask:
         new = frame.near & (self.background - frame.depth > stands_out)
         if not new.any():
             return new
-        far = np.where(frame.depth > 0, frame.depth, FAR).astype(np.float32)
+        far = np.where(frame.depth > BLIND, frame.depth, FAR).astype(np.float32)
         width = THICKNESS * self.focal * self.scene.diameter / far
         sizes = 2 * np.round(width / 2).astype(np.int16) + 1
         thin = np.zeros_like(new)
@@ -270,7 +270,7 @@ def _background(depths: np.ndarray) -> tuple[np.ndarray, float]:
     The noise is a standard deviation at 1 m; it grows with the square of the distance.
     """
     ranks = [int(share * (len(depths) - 1)) for share in (BACKGROUND, 0.5)]
-    depths[depths == 0] = np.inf
+    depths[depths < BLIND] = np.inf
     depths.partition(sorted({*ranks}), axis=0)
     seen, middle = depths[ranks[0]], depths[ranks[1]]
     still = np.isfinite(seen)

@@ -205,7 +205,8 @@ class View:
         """The frame of two decoded pictures."""
         window = window or self.window
         depth = depth[window]
-        seen = self.rays[window] * np.where(depth > 0, depth, np.float32(UNKNOWN))[..., None]
+        known = np.where(depth > 0, depth, np.float32(UNKNOWN))
+        seen = cv2.multiply(self.rays[window], cv2.merge([known] * 3))
         camera = self.geometry.camera
         affine = np.column_stack([camera.rotation.as_matrix(), camera.translation])
         points = cv2.transform(seen, affine.astype(np.float32))
@@ -219,15 +220,16 @@ class View:
         """Pixels of points (H, W, 3) above the floor that the band's length allows."""
         scene, holds = self.scene, self.scene.holds(time)
         places = np.array([*scene.tips, scene.signals.hand(time)])[: 3 if holds else 2]
-        # |x - p|^2 = x.x - 2 p.x + p.p: one affine map of all pixels, which OpenCV does fastest.
+        # |x - p|^2 = x.x - 2 p.x + p.p: affine maps of all pixels, which OpenCV does fastest.
         affine = np.column_stack([-2 * places, np.einsum("ij,ij->i", places, places)])
-        away = cv2.transform(points, affine.astype(np.float32))
-        away += np.einsum("...i,...i->...", points, points)[..., None]
-        away = cv2.sqrt(np.maximum(away, 0, out=away))
-        left, right = away[..., 0], away[..., 1]
-        near = left + right < scene.reach(time)
+        square = cv2.transform(cv2.multiply(points, points), np.ones((1, 3), np.float32))
+        away = [
+            cv2.sqrt(np.maximum(cv2.transform(points, row[None]) + square, 0))
+            for row in affine.astype(np.float32)
+        ]
+        near = away[0] + away[1] < scene.reach(time)
         if holds:
-            near &= np.minimum(left, right) + away[..., 2] < scene.reach_of_half(time)
+            near &= np.minimum(away[0], away[1]) + away[2] < scene.reach_of_half(time)
         return near & (points[..., 2] > scene.floor + 2 * scene.diameter)
 
     def _pixels(self, color: np.ndarray, seen: np.ndarray) -> np.ndarray:

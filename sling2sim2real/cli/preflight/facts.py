@@ -42,6 +42,7 @@ def of_topics(container: Container, recording: Recording | None = None) -> list[
         for topic in container.topics
     }
     for role, stream in recording.streams.items() if recording else ():
+        assert recording
         row = rows[stream.topic]
         row |= {
             "role": f"{row['role']}, {role}" if row["role"] else role,

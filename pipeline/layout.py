@@ -7,6 +7,8 @@ from pathlib import Path
 
 from pipeline.params.run import Pair, Recording
 
+ROOT = Path(__file__).parents[1]  # of the checkout that this file is in
+
 
 @dataclass(frozen=True)
 class Layout:

@@ -1,4 +1,5 @@
 # The public names, each once, and the module that has it.
+from .api.csv_folder import episode_from_csv as episode_from_csv
 from .api.episodes import episode_from_arrays as episode_from_arrays
 from .api.episodes import read_mcap as read_mcap
 from .api.exporting import Exported as Exported

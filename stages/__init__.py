@@ -13,6 +13,7 @@ from sling2sim2real.base.errors import UserError
 
 gc.set_threshold(100_000)  # while torch loads, a tenth or more of the time looked for garbage
 
+os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"  # it would seek them in all packages
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # NumPy's and SciPy's; read when they are imported
 try:
     home.settle()

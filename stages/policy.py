@@ -13,7 +13,7 @@ from __future__ import annotations
 from functools import partial
 
 from pipeline.layout import Layout
-from sling2sim2real.base.machine import devices
+from sling2sim2real.base.machine import device
 from sling2sim2real.base.progress import Progress
 from sling2sim2real.identification.results.theta import load_theta
 from sling2sim2real.launching.surface.simulator import asked_of_the_hand, simulator
@@ -30,7 +30,7 @@ def main() -> None:
     iterations = params.policy.iterations
     how = make_policy(
         layout.policy(pair),
-        simulator(params, band, theta, clamps, device=devices()),
+        simulator(params, band, theta, clamps, device=device()),
         params,
         band,
         pair.method,

@@ -21,7 +21,7 @@ ROW = Parameter(
     reach=(0.0, 0.5),
     box=(0.0, 0.4),
     law="rubber",
-    coordinate=Coordinate(0.02, prior=(0.0, 0.1), half=True),
+    coordinate=Coordinate(0.02, prior=(0.0, 0.1), rectified=True),
 )
 parameters.TABLE = (*parameters.TABLE, ROW)
 

@@ -1,57 +1,62 @@
-"""dvc.yaml lists exactly the code that each stage runs, and the folders keep their distance."""
+"""dvc.yaml lists exactly the code that each stage imports, and the folders keep their distance.
+
+DVC runs a stage again when something that it lists changes; it sees no imports. A stage lists the
+folder of each module that its script imports at any depth, inside functions too: a folder is one
+concern. UNTRACKED is nobody's dependency: dvc.yaml has the keys of params.yaml and spells the paths
+itself. Searches are found by name, and their files are listed by hand.
+"""
 
 import ast
 import re
-from collections.abc import Iterator
-from functools import cache
-from pathlib import Path
 
+import grimp
 import pytest
 
 from pipeline.band_folder import KEPT
-from sling2sim2real.base import code as of_project
-from sling2sim2real.base.code import CODE, NESTED, ROOT, UNTRACKED, closure
 from sling2sim2real.settings.identification import OWN, SEARCHES
-from tests.project import write_files
-from tools.closure import BY_NAME, folders, script_of, stages
+from tests.project import ROOT, STAGES
 
-STAGES = stages()
-HIDDEN = "rig/"
-MAY_SEE_THE_RIG = {
-    "stages/record.py",
-    "stages/floor.py",
-    "stages/trials.py",
-}
-ORACLE = "rig/oracle/"
-PROOF = "validation/campaigns/"  # which holds what was identified against the truth
-MAY_ASK_THE_ORACLE = ("stages/floor.py", ORACLE, PROOF)
+PACKAGES = ("pipeline", "rig", "sling2sim2real", "stages", "validation")
+GRAPH = grimp.build_graph(*PACKAGES, exclude_type_checking_imports=True, cache_dir=None)
+UNTRACKED = ("sling2sim2real.settings", "pipeline.params", "pipeline.layout", "stages.start")
+IDENTIFICATION = "sling2sim2real.identification"
+NESTED = {*PACKAGES, IDENTIFICATION, f"{IDENTIFICATION}.searches"}  # packages of concerns
+SEARCH = "sling2sim2real/identification/searches/{}.py"
+BY_NAME = {"history": SEARCH.format("de"), "search": SEARCH.format("${item.search}")}
+RIG_SEEN_BY = ("rig.", "stages.record", "stages.floor", "stages.trials", "validation.campaigns.")
+ORACLE_SEEN_BY = ("rig.oracle.", "stages.floor", "validation.campaigns.")
 
 
-imports = cache(of_project.imports)
+def parents(module: str) -> list[str]:
+    """A module and its packages, the outermost first."""
+    parts = module.split(".")
+    return [".".join(parts[:n]) for n in range(1, len(parts) + 1)]
 
 
-@pytest.fixture(scope="module", autouse=True)
-def each_file_is_read_once() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(of_project, "imports", imports)
-        yield
+def concerns(script: str) -> set[str]:
+    """Folders and files of the code that a script runs, itself among them."""
+    seen: set[str] = set()
+    queue = {script}
+    while queue:
+        seen.add(module := queue.pop())
+        if not {*parents(module)} & {*UNTRACKED}:
+            queue |= {*parents(module), *GRAPH.find_modules_directly_imported_by(module)} - seen
+    tracked = [parents(module) for module in seen - NESTED if not {*parents(module)} & {*UNTRACKED}]
+    paths = [next(x for x in packages if x not in NESTED).replace(".", "/") for packages in tracked]
+    return {path if (ROOT / path).is_dir() else f"{path}.py" for path in paths}
 
 
-@cache
-def code() -> list[Path]:
-    return sorted(file for top in CODE for file in (ROOT / top).rglob("*.py"))
+@pytest.mark.parametrize("name", STAGES)
+def test_a_stage_lists_the_code_that_it_runs(name: str) -> None:
+    listed = {dep for dep in STAGES[name]["deps"] if dep.startswith(PACKAGES)}
+    assert listed == {*concerns(f"stages.{name}"), *filter(None, [BY_NAME.get(name)])}
+    assert STAGES[name]["cmd"].startswith(f"sh stages/run.sh {name}")
 
 
-def relative(file: Path) -> str:
-    return file.relative_to(ROOT).as_posix()
-
-
-def test_stages_list_the_folders_that_they_run() -> None:
-    for name, stage in STAGES.items():
-        listed = [dep for dep in stage["deps"] if dep.startswith(CODE)]
-        code = {*folders(script_of(stage)), *filter(None, [BY_NAME.get(name)])}
-        assert {*listed} == code, f"{name}: `python tools/closure.py` says what differs"
-        assert len(listed) <= 14
+def test_every_script_is_a_stage_and_every_search_a_file() -> None:
+    scripts = {module for module in GRAPH.modules if module.startswith("stages.")}
+    assert scripts == {"stages.start", *(f"stages.{name}" for name in STAGES)}
+    assert all((ROOT / SEARCH.format(name)).is_file() for name in (*[*SEARCHES][2:], OWN))
 
 
 def test_a_bands_folder_keeps_settings_that_its_stage_depends_on() -> None:
@@ -65,76 +70,28 @@ def test_what_a_run_may_leave_empty_is_in_git() -> None:
         assert (ROOT / "data" / name / ".gitkeep").is_file(), name
 
 
-def test_each_search_of_ours_has_its_own_code_as_a_dependency() -> None:
-    for search in (*SEARCHES[2:], OWN):
-        assert (ROOT / BY_NAME["search"].replace("${item.search}", search)).is_file(), search
-
-
-def test_every_script_is_a_stage() -> None:
-    scripts = {*(ROOT / "stages").glob("[a-z]*.py")} - {ROOT / path for path in UNTRACKED}
-    assert scripts == {script_of(stage) for stage in STAGES.values()}
-
-
-def test_the_rig_stays_hidden() -> None:
-    for file in code():
-        name = relative(file)
-        if name in MAY_SEE_THE_RIG or name.startswith((HIDDEN, PROOF)):
-            continue
-        seen = [relative(other) for other in imports(file) if relative(other).startswith(HIDDEN)]
-        assert not seen, f"{name} imports {seen[0]}"
-        assert not re.search(r"\bparams\.rig\b", file.read_text()), f"{name} reads params.rig"
-
-
-def test_the_oracle_feeds_no_method() -> None:
-    for file in code():
-        name = relative(file)
-        seen = [relative(other) for other in imports(file) if relative(other).startswith(ORACLE)]
-        assert not seen or name.startswith(MAY_ASK_THE_ORACLE), f"{name} imports {seen[0]}"
-    for stage in ("history", "cma", "posterior", "search", "theta", "policy", "trials"):
-        reached = closure(ROOT / "stages" / f"{stage}.py")
-        assert not any(other.startswith(ORACLE) for other in reached), stage
+@pytest.mark.parametrize(
+    ("hidden", "seen_by"), [("rig", RIG_SEEN_BY), ("rig.oracle", ORACLE_SEEN_BY)]
+)
+def test_the_rig_stays_hidden_and_its_oracle_feeds_no_method(hidden: str, seen_by: tuple) -> None:
+    for module in {hidden, *GRAPH.find_descendants(hidden)}:
+        importers = GRAPH.find_modules_that_directly_import(module)
+        assert not [name for name in importers if not f"{name}.".startswith(seen_by)], module
+    for file in (file for top in PACKAGES for file in (ROOT / top).rglob("*.py")):
+        name = ".".join(file.relative_to(ROOT).with_suffix("").parts)
+        assert name.startswith(RIG_SEEN_BY) or not re.search(r"\bparams\.rig\b", file.read_text())
 
 
 def test_nothing_imports_the_tests() -> None:
     """What tests and campaigns share lies in validation/, which is packaged; tests/ is not."""
-    for file in [*code(), *(ROOT / "tools").glob("*.py"), *(ROOT / "examples").glob("*.py")]:
-        text = file.read_text(encoding="utf-8")
-        assert not re.search(r"^\s*(from|import) tests\b", text, re.MULTILINE), relative(file)
+    for file in (
+        file for top in (*PACKAGES, "tools", "examples") for file in ROOT.glob(f"{top}/**/*.py")
+    ):
+        assert not re.search(r"^\s*(from|import) tests\b", file.read_text(), re.MULTILINE), file
 
 
-def test_a_folder_of_folders_holds_no_code() -> None:
+def test_a_package_of_concerns_holds_no_code() -> None:
     """It is no dependency of a stage, so nothing may depend on it."""
-    for name in (f"{folder}__init__.py" for folder in NESTED if folder != "sling2sim2real/"):
-        module = ast.parse((ROOT / name).read_text())
+    for name in NESTED - {"sling2sim2real", "stages"}:
+        module = ast.parse((ROOT / name.replace(".", "/") / "__init__.py").read_text())
         assert len(module.body) == 1 and ast.get_docstring(module), name
-
-
-def test_closure_follows_every_form_of_import(tmp_path: Path) -> None:
-    files = {
-        "stages/s.py": "import json\nimport pipeline.a.one\n",
-        "pipeline/__init__.py": "",
-        "pipeline/a/__init__.py": "from .two import thing\n",
-        "pipeline/a/one.py": "def f():\n    from pipeline import b, missing\n",
-        "pipeline/a/two.py": "from ..c import deep as d\nfrom . import three\nthing = 1\n",
-        "pipeline/a/three.py": "from pipeline.c.deep import value\n",
-        "pipeline/a/unused.py": "",
-        "pipeline/a/native.h": "",
-        "pipeline/b.py": "import pipeline.a.one\n",
-        "pipeline/c/__init__.py": "",
-        "pipeline/c/deep.py": "value = 1\n",
-        "pipeline/e/__init__.py": "",
-        "pipeline/e/other.cpp": "",
-    }
-    write_files(tmp_path, files)
-    expected = set(files) - {
-        "pipeline/a/unused.py",
-        "pipeline/e/__init__.py",
-        "pipeline/e/other.cpp",
-    }
-    assert set(closure(tmp_path / "stages/s.py", tmp_path)) == expected
-    assert folders(tmp_path / "stages/s.py", tmp_path) == [
-        "pipeline/a",
-        "pipeline/b.py",
-        "pipeline/c",
-        "stages/s.py",
-    ]

@@ -23,7 +23,7 @@ def test_rows_are_of_one_kind() -> None:
     for row in (row for row in TABLE if isinstance(row, Parameter)):
         assert row.reach[0] < row.reach[1]
         assert row.default is None or row.reach[0] <= row.default <= row.reach[1]
-        if row.coordinate and row.coordinate.half and row.coordinate.prior:
+        if row.coordinate and row.coordinate.rectified and row.coordinate.prior:
             assert row.coordinate.prior[0] == row.reach[0]
 
 

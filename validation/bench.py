@@ -20,9 +20,7 @@ LAWS = NEO_HOOKEAN, RUBBER
 def parser() -> Parser:
     """Command line of `sling bench`."""
     parser = Parser(prog="sling bench", description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument(
-        "--device", default="cpu", help="cpu (default), cuda:0, cuda:0,cuda:1, or cuda: all GPUs"
-    )
+    parser.add_argument("--device", default="cpu", help="cpu (default), or a GPU such as cuda:0")
     parser.add_argument(
         "--law", choices=LAWS, default=LAWS[0], help=f"of the band; default {LAWS[0]}"
     )

@@ -6,7 +6,7 @@ import os
 import platform
 from importlib.metadata import version
 
-from sling2sim2real.base.code import ROOT
+from pipeline.layout import ROOT
 from sling2sim2real.base.machine import commit, named, processor
 
 
@@ -14,14 +14,13 @@ def environment(device: str, command: str = "") -> dict:
     """What a figure belongs to: device, its name, cores, command, commit and versions."""
     import warp as wp
 
-    devices, name = named(device, "--device"), processor()
+    device, name = named(device, "--device"), processor()
     if device != "cpu":
-        name = wp.get_device(devices[0]).name
+        name = wp.get_device(device).name
     packages = ("warp-lang", "numpy", "scipy")
     return {
         "device": device,
         "device_name": name,
-        "devices": len(devices),
         "cores": os.cpu_count(),
         "command": command or f"sling bench --device {device} --json",
         "commit": commit(ROOT),

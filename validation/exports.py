@@ -13,13 +13,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 from pipeline.band_folder import identified
-from pipeline.layout import Layout
 from pipeline.params import load
 from sling2sim2real.api.exporting import export
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.machine import devices
-from sling2sim2real.episode.episode import Episode
+from sling2sim2real.base.machine import device
 from sling2sim2real.exporting.card import ASKED
 from validation.reports import write_report
 
@@ -29,7 +27,7 @@ TARGETS = {  # packages (Newton's match is MuJoCo's), and the command's argument
     "newton": (("newton", "mujoco"), "--to newton"),
     "usd": ((), "--to usd band1-dips band2-dips band3-dips"),
 }
-KEPT = "met engine proof matched time_step_s time_step_error springs_error pull match on_paper"
+KEPT = "met engine proof matched time_step_s time_step_error springs_error match on_paper"
 KEPT = (*KEPT.split(), "factor_on_youngs_modulus", "factor_on_mass", "factor_on_rest_length")
 
 
@@ -40,8 +38,8 @@ def main() -> None:
     parser.add_argument("bands", nargs="*", metavar="RECORDING")
     args, cards = parser.parse_args(), {}
     target, (packages, arguments) = args.to, TARGETS[args.to]
-    device = {"mjcf": "cpu", "newton": devices()[0], "usd": "cuda:0"}[target]
-    name = f"{target}-gpu" if target == "newton" and device != "cpu" else target
+    place = {"mjcf": "cpu", "newton": device(), "usd": "cuda:0"}[target]
+    name = f"{target}-gpu" if target == "newton" and place != "cpu" else target
     path, bands = Path(REPORT.format(name)), args.bands or list(load().run.first)
     versions = {name: version(name) for name in packages}
     for band in bands:
@@ -53,7 +51,7 @@ def main() -> None:
             "met": len(cards) == len(bands) and all(row["met"] for row in cards.values()),
             "bands": cards,
         }
-        write_report(path, content, arguments, device=device, versions=versions)
+        write_report(path, content, arguments, device=place, versions=versions)
 
 
 def exported(target: str, band: str) -> dict:
@@ -63,8 +61,8 @@ def exported(target: str, band: str) -> dict:
         if band not in run.recordings:
             raise UserError(f"{band}: params.yaml records {', '.join(run.recordings)}")
         pair = run.pairs[f"{band}-{run.main}"]
-        model, episode = identified(pair), Episode.load(Layout().episode(pair))
-        card = export(model, target, folder, episode=episode).card
+        model = identified(pair)
+        card = export(model, target, folder).card
     if "met" not in card:
         raise UserError(f"{target}: its engine or a GPU is missing; nothing was launched there")
     return card

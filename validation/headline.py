@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sling2sim2real.base.code import ROOT
+from pipeline.layout import ROOT
 from sling2sim2real.simulator.rubber import COROTATED
 from validation.campaigns import ablations, landings
 from validation.campaigns.rig_scores import TARGETS

@@ -11,8 +11,8 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from pipeline.layout import ROOT
 from sling2sim2real.base import errors
-from sling2sim2real.base.code import ROOT
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_text
 from sling2sim2real.recording.checks import CHECKS
@@ -39,7 +39,9 @@ BLOCKS: dict[str, tuple[str, Callable[[], list[str]]]] = {  # by page: name of i
     "docs/reference/checks.md": ("checks", checks),
     "docs/identification.md": (
         "landings",
-        lambda: landings.table({s: read(ROOT / landings.report_of(s)) for s in landings.SETS}),
+        lambda: landings.table(
+            {name: read(ROOT / landings.report_of(name)) for name in ("bands", "sealed")}
+        ),
     ),
     "docs/paper.md": ("ablations", lambda: ablations.table(read(ROOT / ablations.LARGE))),
     "docs/recording.md": ("field", lambda: field.table(read(ROOT / field.REPORT))),

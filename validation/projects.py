@@ -18,9 +18,9 @@ from typing import TypeVar
 import psutil
 from ruamel.yaml import YAML
 
+from pipeline.layout import ROOT
 from pipeline.params import Params, load
 from pipeline.params.run import PLAIN, UNIONS
-from sling2sim2real.base.code import ROOT
 
 DEFAULTS = ROOT / "params.yaml"
 CLI = (

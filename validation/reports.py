@@ -9,7 +9,7 @@ from textwrap import wrap
 
 import numpy as np
 
-from sling2sim2real.base.code import ROOT
+from pipeline.layout import ROOT
 from sling2sim2real.base.files import write_json
 from validation.environment import environment
 

@@ -7,8 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -42,7 +41,7 @@ def bench(params: Params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
     """Time the yardstick.
 
     Args:
-        device: Or several that share each batch, as SLING_DEVICE names them.
+        device: As SLING_DEVICE names it.
         law: Of the simulated band.
 
     Returns:
@@ -53,30 +52,28 @@ def bench(params: Params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
     Raises:
         UserError: There is no such device.
     """
-    devices = named(device, "--device")
-    kind = devices[0].partition(":")[0]
+    device = named(device, "--device")
+    kind = device.partition(":")[0]
     sling, episode = recorded_yardstick(params)
     sling, setup = replace(sling, law=law), LaunchSetup.of(params.setup, params.sling)
     box = SearchBox.of(params.parameters, bounds=BOXES[law], law=law)
     loss = EpisodeLoss.of(params, next(iter(params.methods)), episode, sling)
 
-    def on_one(parameters: Parameters, **options) -> Rollouts:
-        return interact(sling, episode, parameters, fetch=False, **options)
+    def simulate(parameters: Parameters, **options) -> Rollouts:
+        return interact(sling, episode, parameters, device=device, fetch=False, **options)
 
     def shoot(parameters: Parameters, **options) -> Launches:
         return launch(
-            sling, setup, parameters, np.array([[-DRAW, -0.15]]), device=devices, **options
+            sling, setup, parameters, np.array([[-DRAW, -0.15]]), device=device, **options
         )
-
-    simulate = partial(shared, devices, on_one)
 
     batches = []
     for count in BATCHES[kind]:
         unit = qmc.LatinHypercube(box.dimension, rng=1).random(count)
         points = box.parameters(box.to_physical(unit))
         for workers in sorted({1, os.cpu_count() or 1} if kind == "cpu" else {1}):
-            evaluate = Evaluator(episode, sling, loss, box, devices=devices, workers=workers)
-            evaluate(unit[: len(devices)]), shoot(points[:1])  # what compiles
+            evaluate = Evaluator(episode, sling, loss, box, device=device, workers=workers)
+            evaluate(unit[:1]), shoot(points[:1])  # what compiles
             alone = seconds(partial(simulate, points, workers=workers))
             with_loss = seconds(partial(evaluate, unit))
             batches.append(
@@ -90,7 +87,7 @@ def bench(params: Params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
                     "launches_per_s": count / seconds(partial(shoot, points, workers=workers)),
                 }
             )
-    iterations = np.mean([part.iterations.mean() for part in simulate(points)])
+    iterations = simulate(points).iterations.mean()
     schedule = schedule_of(sling, episode)
     return {
         "law": law,
@@ -98,11 +95,9 @@ def bench(params: Params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
         "yardstick": {
             "steps": steps_of(schedule),
             "newton_iterations": round(float(iterations)),
-            "bytes_a_rollout": memory(
-                sling, schedule, len(episode.cloud_time), Options(devices[0])
-            ),
+            "bytes_a_rollout": memory(sling, schedule, len(episode.cloud_time), Options(device)),
         },
-        "first_start_s": first_start(devices[0]),
+        "first_start_s": first_start(device),
     }
 
 
@@ -168,16 +163,3 @@ def seconds(run: Callable[[], object], repeats: int = REPEATS) -> float:
         run()
         times.append(time.perf_counter() - start)
     return min(times)
-
-
-def shared(devices: Sequence[str], simulate: Callable, parameters: Parameters, **options) -> list:
-    """What `simulate` gives for each device's share of N parameters, all at once."""
-    shares = np.array_split(np.arange(len(parameters)), len(devices))
-    with ThreadPoolExecutor(len(devices)) as pool:
-        return list(
-            pool.map(
-                lambda device, share: simulate(parameters[share], device=device, **options),
-                devices,
-                shares,
-            )
-        )

@@ -1,6 +1,6 @@
 """`sling flow`: run stale stages in parallel, as a flow of Prefect's.
 
-    python -m pipeline.flow [STAGE ...] [--workers N] [--gpus N] [--dask ADDRESS] [--slurm FILE]
+    python -m pipeline.flow [STAGE ...] [--workers N] [--dask ADDRESS] [--slurm FILE]
 
 Run in the project's folder. A STAGE is one of `dvc stage list`, or a step for all its stages.
 """
@@ -20,22 +20,11 @@ from sling2sim2real.cli.command_line import Parser
 def parser() -> Parser:
     """Command line of `sling flow`."""
     parser = Parser(prog="sling flow", description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument(
-        "targets", nargs="*", metavar="STAGE", help="or a step for all its stages; default: all"
-    )
-    parser.add_argument(
-        "--workers",
-        type=kinds.count,
-        metavar="N",
-        help="stages at a time; default: as many as cores, 16 on a cluster",
-    )
-    parser.add_argument(
-        "--gpus", type=kinds.count, metavar="N", help="GPU stages at a time; default 1"
-    )
-    parser.add_argument(
-        "--dask", type=kinds.address, metavar="ADDRESS", help="of a scheduler: its workers run"
-    )
-    parser.add_argument("--slurm", type=Path, metavar="FILE", help="of SLURM jobs, which run")
+    add = parser.add_argument
+    add("targets", nargs="*", metavar="STAGE", help="or a step for all its stages; default: all")
+    add("--workers", type=kinds.count, metavar="N", help="at a time; default: cores, or 16 away")
+    add("--dask", type=kinds.address, metavar="ADDRESS", help="of a scheduler: its workers run")
+    add("--slurm", type=Path, metavar="FILE", help="of SLURM jobs, which run")
     return parser
 
 
@@ -51,7 +40,7 @@ def main() -> None:
     server.configure(root)
     from pipeline.flow.flow import run  # Prefect reads its settings when it is imported
 
-    print(run(root, graph, given.workers, given.gpus, given.dask, given.slurm))
+    print(run(root, graph, given.workers, given.dask, given.slurm))
 
 
 if __name__ == "__main__":

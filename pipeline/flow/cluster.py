@@ -26,10 +26,8 @@ from sling2sim2real.base.machine import cores, workers
 
 
 @contextmanager
-def there(dask: str | None, slurm: Path | None) -> Iterator[tuple[dict[str, str], int | None]]:
-    """What in a stage's environment hands it over, and how many stages at a time; or nothing.
-
-    Each of them has DVC wait here, so they are few.
+def there(dask: str | None, slurm: Path | None) -> Iterator[dict[str, str]]:
+    """What in a stage's environment hands it over; nothing without a cluster.
 
     Args:
         dask: Address of a scheduler.
@@ -48,12 +46,12 @@ def there(dask: str | None, slurm: Path | None) -> Iterator[tuple[dict[str, str]
         cluster: Any = SLURMCluster(scheduler_options={"dashboard": False})
         with cluster:
             cluster.adapt()
-            yield {"SLING_DASK": cluster.scheduler_address}, 16
+            yield {"SLING_DASK": cluster.scheduler_address}
     elif dask:
         connected(dask).close()
-        yield {"SLING_DASK": dask}, 16
+        yield {"SLING_DASK": dask}
     else:
-        yield {}, None
+        yield {}
 
 
 def connected(address: str) -> Any:

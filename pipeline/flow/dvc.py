@@ -17,17 +17,18 @@ from typing import Any
 
 import networkx
 import psutil
-from ruamel.yaml import YAML
 
 from sling2sim2real.base.disk import with_disk
 from sling2sim2real.base.errors import UserError, one_line
-from sling2sim2real.base.machine import cores
 
-DVC = (sys.executable, "-P", "-m", "dvc", "--wait-for-lock")
+# Without looking for garbage, which is a sixth of a command: it parses dvc.lock and ends.
+MAIN = "import gc, sys; gc.disable(); from dvc.cli import main; sys.exit(main(sys.argv[1:]))"
+DVC = (sys.executable, "-P", "-c", MAIN, "--wait-for-lock")
 GRACE = 15.0  # s that interrupted stages and DVC have to end
-# What DVC says of itself, beside which stage it runs.
-CHATTER = re.compile("> |Updating|Generating|To track|\tgit add|To enable|\tdvc|Use `dvc|Data and")
-FAILED = re.compile("ERROR: (?:failed to reproduce '.+?': )?(?:failed to run: .*with (-?[0-9]+))?")
+BEGINS = "Running stage"
+OF_DVC = re.compile(  # what it says of itself
+    f"{BEGINS}|> |Updating|Generating|To track|\tgit add|To enable|\tdvc|Use `dvc|Data and|ERROR:"
+)
 
 PIPED: dict[str, Any] = {
     "stdin": subprocess.DEVNULL,
@@ -42,10 +43,6 @@ _running: set[subprocess.Popen] = set()
 _ending = threading.Event()
 
 
-class StageFailed(UserError):
-    """A stage failed; the message is its name and its own clear line."""
-
-
 def stale(root: Path, targets: Sequence[str] = ()) -> networkx.DiGraph:
     """The graph of stages that are stale or follow from such, from producers to consumers.
 
@@ -54,8 +51,7 @@ def stale(root: Path, targets: Sequence[str] = ()) -> networkx.DiGraph:
         targets: Stages, or steps for all their stages: these alone and what leads to them.
 
     Returns:
-        Its nodes are names as DVC has them; `gpu` says of each whether it computes where
-        SLING_DEVICE says (`meta: {gpu: true}` in dvc.yaml).
+        Its nodes are names as DVC has them.
 
     Raises:
         UserError: A target is no stage, DVC cannot read the project, or another DVC is at work.
@@ -66,10 +62,8 @@ def stale(root: Path, targets: Sequence[str] = ()) -> networkx.DiGraph:
     graph = graph_of(root)
     first = [name for name in graph if name in status]
     names = {*first}.union(*(networkx.descendants(graph, name) for name in first))
-    if targets:
-        ends = {name for target in targets for name in named(target, graph)}
-        names &= ends.union(*(networkx.ancestors(graph, name) for name in ends))
-    return graph.subgraph(names)
+    ends = {name for target in targets for name in named(target, graph)} or {*graph}
+    return graph.subgraph(names & ends.union(*(networkx.ancestors(graph, name) for name in ends)))
 
 
 def graph_of(root: Path) -> networkx.DiGraph:
@@ -78,10 +72,6 @@ def graph_of(root: Path) -> networkx.DiGraph:
     graph = networkx.DiGraph(re.findall('"(.+)" -> "(.+)";', dot))
     graph.add_nodes_from(re.findall('^"([^"]+)";$', dot, re.MULTILINE))
     graph.remove_nodes_from([name for name in graph if name.endswith(".dvc")])  # of `dvc add`
-    steps = YAML(typ="safe").load((root / "dvc.yaml").read_text(encoding="utf-8"))["stages"]
-    for name, data in graph.nodes(data=True):
-        step = steps[name.partition("@")[0]]
-        data["gpu"] = step.get("do", step).get("meta", {}).get("gpu", False)
     return graph
 
 
@@ -100,62 +90,46 @@ def _said(root: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def environment(threads: int | None = None) -> dict[str, str]:
+def environment(threads: int) -> dict[str, str]:
     """What a stage gets: all that is exported here, this Python first, and `threads` threads."""
-    share = str(threads or cores())
     return os.environ | {
         "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]),
         "SHELL": "/bin/sh",  # by which DVC starts stages: a C shell would read its settings
         "PYTHONUNBUFFERED": "1",  # lines as they come
-        "SLING_WORKERS": share,
-        "OMP_NUM_THREADS": share,
+        "SLING_WORKERS": str(threads),
+        "OMP_NUM_THREADS": str(threads),
         "SLING_FLOW": str(os.getpid()),  # a stage ends where we are killed, see stages/start.py
     }
 
 
-def repro(
-    root: Path,
-    target: str,
-    on_line: Callable[[str], None],
-    options: Sequence[str] = (),
-    env: Mapping[str, str] | None = None,
-) -> list[str]:
-    """Run `dvc --wait-for-lock repro TARGET`, which runs what is stale of it.
+def repro(root: Path, stage: str, env: Mapping[str, str], on_line: Callable[[str], None]) -> None:
+    """Run `dvc --wait-for-lock repro -s STAGE`, which runs a stage if it is stale.
 
     Args:
         root: The working copy.
-        target: A stage.
-        on_line: Called with each line of the stages, and DVC's that one begins.
-        options: More of DVC's: `-s` for the stage alone.
-        env: The whole environment; None: `environment` with all cores.
-
-    Returns:
-        All that was said, in lines.
+        stage: Its producers are fresh.
+        env: The whole environment, from `environment`.
+        on_line: Called with each line of the stage, and DVC's of where it begins or need not run.
 
     Raises:
-        StageFailed: With the name of the stage that failed, and why.
+        UserError: Why it failed.
     """
     if _ending.is_set():
-        raise StageFailed(f"{target}: interrupted")
-    begin, output = 0, []
-    command = [*DVC, "repro", *options, target]
-    process = subprocess.Popen(command, cwd=root, env=env or environment(), **PIPED)
+        raise UserError("interrupted")
+    process = subprocess.Popen([*DVC, "repro", "-s", stage], cwd=root, env=env, **PIPED)
     _running.add(process)
+    output = []
     try:
         for line in map(str.rstrip, process.stdout or ()):
             output.append(line)
-            if line.startswith("Running stage '"):
-                begin = len(output)
-            if line and not CHATTER.match(line) and not line.startswith("ERROR: failed to repro"):
+            if line.startswith(BEGINS) or (line and not OF_DVC.match(line)):
                 on_line(line)
         process.wait()
     finally:
         _end([process])
         _running.discard(process)
     if process.returncode:
-        name = [target, *re.findall("failed to reproduce '(.+?)'", "\n".join(output))][-1]
-        raise StageFailed(with_disk(f"{name}: {cause(output[begin:], process.returncode)}", root))
-    return output
+        raise UserError(with_disk(cause(output, process.returncode), root))
 
 
 def end_all() -> None:
@@ -183,21 +157,19 @@ def cause(output: Sequence[str], status: int) -> str:
     """Why a DVC command failed: the stage's line of error, its signal or exit status, or DVC's.
 
     Args:
-        output: What it and its last stage said, in lines.
+        output: What it and its stage said, in lines.
         status: Its exit status.
     """
-    said = [line for line in output if line and not CHATTER.match(line)]
-    own = [line for line in said if not line.startswith(("ERROR: ", "Running stage '"))]
-    errors = [line[7:] for line in own if line.startswith("error: ")]
-    if any(re.search(r"dvc\.lock' (is invalid|validation failed)", line) for line in own):
+    text = "\n".join(output)
+    if re.search(r"dvc\.lock' (is invalid|validation failed)", text):
         return "dvc.lock was cut off while it was written; `git checkout dvc.lock` mends it"
-    for number, line in enumerate(said):
-        if failed := FAILED.match(line):
-            if failed[1] is None:  # DVC itself, before or after the stage's command
-                return one_line(" ".join([line[failed.end() :], *said[number + 1 : number + 2]]))
-            status = int(failed[1])
-    if errors:
+    if of_stage := re.search("^ERROR: .*failed to run: .*with (-?[0-9]+)$", text, re.MULTILINE):
+        status = int(of_stage[1])
+    elif own := re.search("^ERROR: (?:failed to reproduce '.+?': )?((?:.+\n?){1,2})", text, re.M):
+        return one_line(own[1])  # before or after the stage's command
+    said = [line for line in output if line and not OF_DVC.match(line)]
+    if errors := [line[7:] for line in said if line.startswith("error: ")]:
         return errors[-1]
     if status < 0 or 128 < status < 192:  # as Python has it, and as a shell
         return f"was killed by signal {abs(status) % 128}"
-    return f"{own[-1] if own else 'said nothing'} (exit status {status})"
+    return f"{said[-1] if said else 'said nothing'} (exit status {status})"

@@ -6,8 +6,10 @@ To be imported when `server.configure` has set the project's settings of Prefect
 from __future__ import annotations
 
 import re
+import threading
 import time
 from collections import Counter
+from contextlib import nullcontext
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -16,8 +18,6 @@ import networkx
 from prefect import flow, get_run_logger, task
 from prefect.artifacts import create_progress_artifact, update_progress_artifact
 from prefect.cache_policies import NO_CACHE
-from prefect.client.orchestration import get_client
-from prefect.client.schemas.actions import GlobalConcurrencyLimitUpdate
 from prefect.client.schemas.objects import State
 from prefect.states import Completed, Failed
 from prefect.task_runners import ThreadPoolTaskRunner
@@ -27,23 +27,19 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.machine import cores
 from sling2sim2real.base.progress import parse
 
+AWAY = 16  # stages at a time on a cluster: DVC waits here for each
+ON_GPU = ("history", "cma", "search", "policy")  # steps that compute where SLING_DEVICE says
+
 
 def run(
-    root: Path,
-    graph: networkx.DiGraph,
-    workers: int | None = None,
-    gpus: int | None = None,
-    dask: str | None = None,
-    slurm: Path | None = None,
+    root: Path, graph: networkx.DiGraph, workers: int | None, dask: str | None, slurm: Path | None
 ) -> str:
-    """Run stages.
+    """Run stages; those that compute on a GPU one at a time, where SLING_DEVICE is CUDA.
 
     Args:
         root: The working copy.
         graph: As `dvc.stale` gives it.
-        workers: Stages at a time; default as many as cores, which they share, or as `cluster.there`
-            says.
-        gpus: Stages at a time that compute on a GPU; default 1 where SLING_DEVICE is CUDA.
+        workers: Stages at a time; default as many as cores, which they share, or AWAY.
         dask: Address of the scheduler whose workers run the stages.
         slurm: File that says which jobs run them.
 
@@ -53,47 +49,21 @@ def run(
     Raises:
         UserError: A stage failed, with that line and what failed; or no cluster answers.
     """
-    start = time.monotonic()
-    with cluster.there(dask, slurm) as (address, slots):
-        workers = workers or slots or cores()
-        env = dvc.environment(max(1, cores() // workers)) | address
-        gpus = gpus or (1 if env.get("SLING_DEVICE", "").startswith("cuda") else None)
-        if gpus:
-            with get_client(sync_client=True) as client:
-                client.upsert_global_concurrency_limit_by_name("tag:gpu", gpus)
-                free = GlobalConcurrencyLimitUpdate(active_slots=0)  # a killed flow gave none back
-                client.update_global_concurrency_limit("tag:gpu", free)
-        print(f"{len(graph)} stages, {workers} at a time", flush=True)
-        states = _perform(root, graph, env, workers, limited=gpus is not None)
-    counts = Counter(str(state.name) for state in states.values())
-    words = ", ".join(f"{count} {name}" for name, count in counts.items())
-    failed = [f"; {state.message}" for state in states.values() if state.is_failed()]
-    summary = f"stages: {words} ({time.monotonic() - start:.0f} s){''.join(failed)}"
-    if failed:
-        raise UserError(summary)
-    return summary
-
-
-def _perform(
-    root: Path, graph: networkx.DiGraph, env: dict[str, str], workers: int, limited: bool
-) -> dict[str, State]:
-    """Run stages; how each ended: Completed, Cached, Fresh, Failed, or NotReady."""
-    runner: Any = ThreadPoolTaskRunner(max_workers=workers)
-    states: dict[str, State] = {}
+    start, states = time.monotonic(), {}
 
     @task(cache_policy=NO_CACHE)
     def stage(name: str) -> State:
-        return _repro(root, name, env)
+        with gpu if name.partition("@")[0] in ON_GPU else nullcontext():
+            return _repro(root, name, env)
 
-    @flow(name="sling flow", task_runner=runner)
-    def sling_flow(stages: list[str]) -> State:
-        waiting, futures, ended = [*stages], {}, SimpleQueue()
+    @flow(name="sling flow")
+    def sling_flow(waiting: list[str]) -> State:
+        futures, ended = {}, SimpleQueue()
         try:
-            while len(states) < len(stages):
+            while len(states) < len(graph):
                 for name in [n for n in waiting if states.keys() >= {*graph.predecessors(n)}]:
                     waiting.remove(name)
-                    tags = ["gpu"] if limited and graph.nodes[name]["gpu"] else []
-                    named: Any = stage.with_options(task_run_name=name, tags=tags)
+                    named: Any = stage.with_options(task_run_name=name)
                     producers = [futures[producer] for producer in graph.predecessors(name)]
                     futures[name] = named.submit(name, wait_for=producers)
                     futures[name].add_done_callback(lambda _, name=name: ended.put(name))
@@ -108,9 +78,20 @@ def _perform(
 
     # Who has most to follow comes first, and so producers before consumers.
     order = sorted(graph, key=lambda name: -len(networkx.descendants(graph, name)))
-    whole: Any = sling_flow
-    whole(order, return_state=True)
-    return states
+    with cluster.there(dask, slurm) as address:
+        workers = workers or (AWAY if address else cores())
+        env = dvc.environment(max(1, cores() // workers)) | address
+        gpu = threading.Lock() if env.get("SLING_DEVICE", "").startswith("cuda") else nullcontext()
+        print(f"{len(graph)} stages, {workers} at a time", flush=True)
+        runner: Any = ThreadPoolTaskRunner(max_workers=workers)
+        sling_flow.with_options(task_runner=runner)(order, return_state=True)
+    counts = Counter(str(state.name) for state in states.values())
+    words = ", ".join(f"{count} {name}" for name, count in counts.items())
+    failed = [f"; {state.message}" for state in states.values() if state.is_failed()]
+    summary = f"stages: {words} ({time.monotonic() - start:.0f} s){''.join(failed)}"
+    if failed:
+        raise UserError(summary)
+    return summary
 
 
 def _repro(root: Path, name: str, env: dict[str, str]) -> State:
@@ -130,8 +111,7 @@ def _repro(root: Path, name: str, env: dict[str, str]) -> State:
                 bar = create_progress_artifact(percent, key, step.counted)
 
     try:
-        output = "\n".join(dvc.repro(root, name, on_line, ["-s"], env))
-    except dvc.StageFailed as error:
-        return Failed(message=str(error))
-    fresh = "Fresh" if "didn't change, skipping" in output else "Completed"
-    return Completed(name="Cached" if "is cached - skipping" in output else fresh)
+        dvc.repro(root, name, env, on_line)
+    except UserError as error:
+        return Failed(message=f"{name}: {error}")
+    return Completed()

@@ -1,4 +1,9 @@
-"""Prefect, for this project alone: its history is SQLite in .prefect/, and it reports to nobody."""
+"""`sling ui`: serve the Prefect UI, with past and present runs, for this machine alone.
+
+    python -m pipeline.flow.server [--port N]
+
+Prefect is this project's alone: its history is SQLite in .prefect/, and it reports to nobody.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +13,13 @@ import socket
 import sys
 import urllib.request
 from contextlib import suppress
-from importlib.util import find_spec
+from importlib import import_module
 from pathlib import Path
 
+from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
+from sling2sim2real.cli import arguments as kinds
+from sling2sim2real.cli.command_line import Parser
 
 HOST, PORT = "127.0.0.1", 4200
 ASKING = 5.0  # s that a server has to answer
@@ -42,8 +50,6 @@ def configure(root: Path) -> None:
 
 def serve(root: Path, port: int = PORT) -> str:
     """Become Prefect's server, or say where the project's runs already. Raises UserError."""
-    if find_spec("prefect") is None:
-        raise ModuleNotFoundError(name="prefect")
     if where := address(root):
         return f"the UI of this project runs already: {where}"
     try:
@@ -53,9 +59,10 @@ def serve(root: Path, port: int = PORT) -> str:
     url = f"http://{HOST}:{port}"
     _home(root).mkdir(exist_ok=True)
     (_home(root) / "address").write_text(url, encoding="utf-8")
-    print(f"Prefect UI: {url} (Ctrl-C ends it)", file=sys.stderr, flush=True)
     configure(root)
     os.environ["PREFECT_UI_API_URL"] = f"{url}/api"
+    import_module("prefect")  # or an error that says how to install it
+    print(f"Prefect UI: {url} (Ctrl-C ends it)", file=sys.stderr, flush=True)
     command = ["-P", "-m", "prefect", "server", "start", "--host", HOST, "--port", str(port)]
     os.execv(sys.executable, [sys.executable, *command])
 
@@ -73,3 +80,14 @@ def address(root: Path) -> str | None:
 def _home(root: Path) -> Path:
     """Where all of Prefect's files of a project lie."""
     return root.resolve() / ".prefect"
+
+
+def parser() -> Parser:
+    """Command line of `sling ui`."""
+    parser = Parser(prog="sling ui", description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--port", type=kinds.count, metavar="N", default=PORT, help="of the UI")
+    return parser
+
+
+if __name__ == "__main__":
+    errors.run(lambda: print(serve(Path.cwd(), parser().parse_args().port)))

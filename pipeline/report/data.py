@@ -54,7 +54,6 @@ class Result:
         regions: Where the refinement began; none for a search of one phase.
         axes: Names of the regions' axes in the unit cube.
         policy: Its files, which tell draws of targets; `card` is what they say of it.
-        training: One row an iteration of the policy's training.
         landing_map: Simulated launches over the box of draws.
     """
 
@@ -65,7 +64,6 @@ class Result:
     axes: list[str]
     policy: Stored
     card: dict
-    training: pd.DataFrame
     landing_map: LandingMap
 
     @property
@@ -204,6 +202,5 @@ def _result(params: Params, layout: Layout, pair: Pair) -> Result:
         axes=axes,
         policy=policy,
         card=policy.card(),
-        training=pd.read_parquet(made(policy.folder / "training.parquet")),
         landing_map=LandingMap.load(made(policy.folder / "map.parquet")),
     )

@@ -13,14 +13,12 @@ from pipeline.params import Params
 from pipeline.report import paper, tables
 from pipeline.report.data import Result, Run, gather
 from pipeline.report.figures import landings, search, simulation
-from pipeline.report.statistics import LEVEL, differences
 from pipeline.report.tables import markdown
 from sling2sim2real.base.files import replacing, write_json, write_text
 from sling2sim2real.base.target import TARGET_AREA
 from sling2sim2real.base.template import filled
 from sling2sim2real.drawing.canvas import P, Saving
 from sling2sim2real.drawing.page import page
-from sling2sim2real.drawing.styles import drawn
 from sling2sim2real.identification.results.ranges import searched
 from sling2sim2real.settings.identification import POSTERIOR
 
@@ -59,11 +57,7 @@ class Report:
     folder: Path
 
     def __post_init__(self) -> None:
-        run, shown = self.run, drawn(self.run.shared)
-        self.replays = {
-            band: {m: simulation.replayed(run, of_band[m]) for m in of_band if m in shown}
-            for band, of_band in run.results.items()
-        }
+        run = self.run
         launched = run.launched
         self.aimed = launched.loc[launched.target.notna()]
         self.main = {band: of_band[run.main] for band, of_band in run.results.items()}
@@ -108,34 +102,22 @@ class Report:
         )
 
     def appendix(self) -> str:
-        """The second page: differences, predictions, searches, confidence, policies, budget."""
+        """The second page: predictions, losses, policies, budget."""
         run, params = self.run, self.run.params
-        against = differences(run.launched, run.references)
-        if len(against):
-            self._csv("differences", tables.differences_records(against))
         measured = run.launched.query("source == 'measured' and method == @run.main")
         return filled(
             HERE / "appendix.md.j2",
             main=tables.called(run, run.main),
-            level=tables.percent(LEVEL),
-            differences=markdown(tables.differences_text(run, against), repeats=False),
             predicted=markdown(tables.predicted(run), repeats=False),
             measured={b: markdown(tables.launches(of)) for b, of in measured.groupby("band")},
-            pull=self._picture(
-                "pull",
-                "force against draw, residual force, distance of the clouds",
-                simulation.pull, run.episodes, self.replays, run.styles,
-            ),
             losses=markdown(tables.losses(run), repeats=False),
-            convergence=self._convergence(),
             policies=markdown(tables.policies(run), repeats=False),
-            training=self._training(),
             explored=params.optimizer.population * (params.optimizer.generations + 1),
             optimizer=params.optimizer,
             policy=params.policy,
             trials=params.trials,
             rig=params.run.rig,
-        )  # fmt: skip
+        )
 
     def _unconverged(self) -> int | None:
         """Rollouts of each search of the paper's loss, where they are too few; else None."""
@@ -179,7 +161,8 @@ class Report:
         trials = self.aimed.loc[(self.aimed.band == band) & (self.aimed.method == run.main)]
         if trials.empty:
             return None
-        drawing = run.episodes[band], self.replays[band][run.main], self._draws(result), trials
+        replay = simulation.replayed(run, result)
+        drawing = run.episodes[band], replay, self._draws(result), trials
         alt, draw = "from a recording to launches", simulation.overview
         return self._picture("overview", alt, draw, *drawing, run.styles[run.main])
 
@@ -204,30 +187,6 @@ class Report:
                 return band, self._picture("flights", f"flights of {band}", *drawing)
         return None
 
-    def _convergence(self) -> str | None:
-        """Searches on one loss, and the main one; None where no band has two."""
-        searches = {
-            band: {m: of for m, of in of_band.items() if m == self.run.main or self._printed(m)}
-            for band, of_band in self.run.results.items()
-        }
-        if all(len(of_band) < 2 for of_band in searches.values()):
-            return None
-        drawing = search.convergence, searches, self.run.styles
-        return self._picture("convergence", "loss of the best so far against rollouts", *drawing)
-
-    def _printed(self, method: str) -> bool:
-        """Whether a method minimises the printed loss."""
-        weights = dict(self.run.params.methods[method].weights)
-        return all(weight == (name in tables.TERMS) for name, weight in weights.items())
-
-    def _training(self) -> str:
-        curves = {
-            band: {method: of_band[method].training for method in self.run.shared}
-            for band, of_band in self.run.results.items()
-        }
-        drawing = search.training, curves, self.run.styles
-        return self._picture("training", "training error by iteration", *drawing)
-
 
 def doubts(run: Run) -> list[str]:
     """What did not go well, a sentence each."""
@@ -240,7 +199,10 @@ def doubts(run: Run) -> list[str]:
             wrong.append(f"{lost.sum()} of {len(lost)} launches could not be predicted.")
         if not result.card["training"]["converged"]:
             wrong.append("the policy did **not** converge in its own simulator.")
-        if not known.get("settled", True):
+        if edges := known.get("edges"):
+            sides = " and ".join(f"{name} at the {side}" for name, side in edges.items())
+            wrong.append(f"{sides} end of its bounds: the true value may lie outside.")
+        elif not known.get("settled", True):
             steps = known.get("steps", "all its")
             wrong.append(
                 f"the fit had **not settled** after {steps} steps; do not rely on its intervals."

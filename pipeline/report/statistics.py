@@ -1,15 +1,12 @@
-"""What launches say: landing errors, predictions, and which differences are no chance."""
+"""What launches say: landing errors and predictions."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import product
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
-LEVEL = 0.95
 WHOSE = ["name", "band", "method", "source"]  # columns that say whose launches a row is of
 ALL = "all"  # targets
 
@@ -72,61 +69,4 @@ def prediction_errors(launches: pd.DataFrame) -> dict:
         "ranged": len(ranged),
         "covered": int(landing.between(low, high).sum()),
         "width": ((high - low) / landing).median(),
-    }
-
-
-def differences(trials: pd.DataFrame, references: Iterable[str]) -> pd.DataFrame:
-    """How much further off each method lands than each reference, `beside`: see `difference`."""
-    rows, aimed = [], trials.loc[trials.target.notna()]
-    for _, here in aimed.groupby(["name", "band", "source"], sort=False):
-        launches = dict([*here.groupby("method", sort=False)])
-        for method, other in product(launches, references):
-            if method != other and other in launches:
-                whose = launches[method][WHOSE].iloc[0].to_dict()
-                against = difference(launches[other], launches[method])
-                rows.append(whose | {"beside": other} | against)
-    return pd.DataFrame(rows)
-
-
-def difference(first: pd.DataFrame, second: pd.DataFrame) -> dict:
-    """How much further off `second` lands than `first`: the mean over targets that both reach.
-
-    Virtual launches of equal target and trial share their errors and are compared in pairs;
-    measured ones are not. The interval is Student's t with the degrees of freedom of Welch and
-    Satterthwaite, for targets may spread differently. It says what other launches of the same two
-    policies would show, and nothing of another recording or seed: there is one of each.
-
-    Returns:
-        `mean`, `low` and `high` [m], NaN where nothing is compared, or where a target has but one
-        launch; of each, the first last, `launches` that are compared, and the share of all that
-        `failed`; `left_out`, how many of both failed, with the other half of a pair.
-    """
-    good = [trials.loc[trials.miss.notna()] for trials in (first, second)]
-    if {*first.source, *second.source} == {"virtual"}:
-        both = pd.merge(*good, on=["target", "trial"], suffixes=("_beside", ""))
-        farther = both.miss.abs() - both.miss_beside.abs()
-        change = [(part,) for _, part in farther.groupby(both.target)]
-        counts = len(both), len(both)
-    else:
-        common = sorted({*good[0].target} & {*good[1].target})
-        size = [[t.miss[t.target == target].abs() for target in common] for t in good]
-        change = [(there, -here) for here, there in zip(*size, strict=True)]
-        counts = tuple(sum(map(len, parts)) for parts in size)
-    mean = np.mean([sum(part.mean() for part in parts) for parts in change]) if change else np.nan
-    parts = [part for of_target in change for part in of_target]
-    shares = np.array([part.var() / len(part) for part in parts])
-    freedom = np.array([len(part) - 1 for part in parts])
-    reach = np.sqrt(shares.sum()) / len(change) if change else np.nan
-    if reach > 0:
-        welch = shares.sum() ** 2 / (shares**2 / freedom).sum()
-        reach *= stats.t.isf((1 - LEVEL) / 2, welch)
-    return {
-        "mean": mean,
-        "low": mean - reach,
-        "high": mean + reach,
-        "launches": counts[1],
-        "launches_beside": counts[0],
-        "failed": second.miss.isna().mean(),
-        "failed_beside": first.miss.isna().mean(),
-        "left_out": len(first) + len(second) - sum(counts),
     }

@@ -337,37 +337,6 @@ def hits(run: Run) -> pd.DataFrame | None:
     return wide(run, counts, "target", [*targets, ALL]).rename(columns=heads)
 
 
-def differences_text(run: Run, table: pd.DataFrame) -> pd.DataFrame | None:
-    """Differences in cm with their intervals; bold where the interval leaves out zero."""
-    if table.empty:
-        return None
-    cells = table.assign(text=table.apply(_against, axis=1))
-    beside = {method: f"beside {called(run, method)}" for method in run.references}
-    shown = [method for method in beside if (table.beside == method).any()]
-    return wide(run, cells, "beside", shown).rename(columns=beside)
-
-
-def _against(row: pd.Series) -> str:
-    """Write a difference as in "+3.20 (+2.10 to +4.40)"."""
-    if not np.isfinite(row["mean"]):
-        return "N/A"
-    text = f"{100 * row['mean']:+.2f}"
-    if np.isfinite(row.low):
-        text += f" ({100 * row.low:+.2f} to {100 * row.high:+.2f})"
-    text = f"**{text}**" if row.low > 0 or row.high < 0 else text
-    return text + (f", {row.left_out} left out" if row.left_out else "")
-
-
-def differences_records(table: pd.DataFrame) -> pd.DataFrame:
-    """Differences for machines."""
-    known = table.loc[table["mean"].notna()]
-    names = {"mean": "difference_cm", "low": "low_95_cm", "high": "high_95_cm"}
-    numbers = (100 * known[[*names]]).rename(columns=names)
-    shares = {"failed": "failed_share", "failed_beside": "failed_share_beside"}
-    more = known[["launches", "launches_beside", *shares, "left_out"]].rename(columns=shares)
-    return pd.concat([known[["band", "method", "source", "beside"]], numbers, more], axis=1)
-
-
 def predicted(run: Run) -> pd.DataFrame | None:
     """Prediction error of each method on launches of each source, and what its intervals cover."""
     rows, beyond = [], False

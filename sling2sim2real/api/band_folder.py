@@ -141,8 +141,8 @@ class BandFolder:
 
     @property
     def name(self) -> str:
-        """Of the band, a word: `band1_dips` of reports/bands/band1-dips."""
-        return self.path.resolve().name.replace("-", "_")
+        """Of the band: `band1-dips` of reports/bands/band1-dips."""
+        return self.path.resolve().name
 
     @property
     def band_file(self) -> Path:

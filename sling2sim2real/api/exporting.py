@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sling2sim2real.api.model import Model
-from sling2sim2real.episode.episode import Episode
 from sling2sim2real.exporting.export import write
 
 
@@ -26,7 +25,13 @@ class Exported:
     card: dict
 
 
-def export(model: Model, to: str, out: str | Path, *, episode: Episode | None = None) -> Exported:
+def export(
+    model: Model,
+    to: str,
+    out: str | Path,
+    *,
+    samples: int = 0,
+) -> Exported:
     """Write a band for another engine into a folder, with a card that says what came out.
 
     Its parameters are matched to this simulation: the same force to hold a draw, the same landings.
@@ -46,11 +51,11 @@ def export(model: Model, to: str, out: str | Path, *, episode: Episode | None = 
         to: `mjcf` for MuJoCo; `newton` for Newton, which must be installed (extra `export`); `usd`
             for PhysX, to be matched there.
         out: Folder; what an export wrote there before is replaced.
-        episode: Whose pull is compared in both; None: a planned one.
+        samples: Of the posterior, as parameters of the engine in samples.parquet; not for `usd`.
 
     Raises:
-        UserError: No such target, what it needs is missing, the folder holds something else, or
-            the band cannot be matched.
+        UserError: No such target, what it needs is missing, the folder holds something else, the
+            band cannot be matched, or has fewer samples.
     """
-    card = write(model, to, Path(out), episode)  # pyright: ignore[reportArgumentType]
+    card = write(model, to, Path(out), samples)  # pyright: ignore[reportArgumentType]
     return Exported(Path(out), card.get("met"), card)

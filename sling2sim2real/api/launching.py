@@ -13,6 +13,7 @@ from sling2sim2real.base.errors import Refused
 from sling2sim2real.launching.surface.aim import landings_within, secants
 from sling2sim2real.launching.trials.spread import landing_intervals
 from sling2sim2real.launching.trials.stretch import stretch_of
+from sling2sim2real.quantities import QUANTITIES
 from sling2sim2real.simulator.launch import Launches, limited
 from sling2sim2real.simulator.parameters import Parameters
 
@@ -279,6 +280,10 @@ def _hazards(
     if getattr(model, "samples", None) is None:
         what = "no samples of θ: the interval holds the error of the draw alone"
         yield Hazard("confidence", what)
+    elif edges := confidence.get("edges"):
+        name, side = next(iter(edges.items()))
+        where = f"{QUANTITIES[name].label} is at the {side} end of its bounds"
+        yield Hazard("confidence", f"{where}: do not trust the interval")
     elif not confidence.get("settled"):
         yield Hazard("confidence", "the fit has not converged: do not trust the interval")
     elif (effective := confidence.get("effective_samples") or np.inf) < FEW_SAMPLES:

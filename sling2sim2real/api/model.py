@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.machine import cores
+from sling2sim2real.base.machine import cores, device
 from sling2sim2real.base.parameters import Parameter, parameters
 from sling2sim2real.base.schema import explained, read_json
 from sling2sim2real.identification.results.theta import Mounting, ThetaFile, parameters_of
@@ -234,12 +234,14 @@ class Model:
     def launches(self, draws: np.ndarray, points: np.ndarray | None = None) -> Launches:
         """Launch draws (N, 2) [m], each by θ or by a point of its own (N, P) as `Theta.point`.
 
-        No arm limits the force here.
+        No arm limits the force here. SLING_DEVICE says where they are simulated.
         """
         draws = np.atleast_2d(np.asarray(draws, float))
         law = self.theta.law
         parameters = self.theta.parameters if points is None else Parameters(law, points)
-        return launch_many(self.sling, self.launch_setup, parameters, draws, workers=cores())
+        return launch_many(
+            self.sling, self.launch_setup, parameters, draws, device=device(), workers=cores()
+        )
 
     def _history(self) -> LaunchHistory | None:
         pull_history = dict(vars(self.history)) if self.history else {}

@@ -16,6 +16,7 @@ def rehearse(
     model: Model,
     draw: tuple[float, float] = (-0.40, 0.0),
     *,
+    dips: bool = False,
     force_noise: float = 0.05,
     depth_noise: float = 0.001,
     seed: int = 0,
@@ -35,6 +36,7 @@ def rehearse(
     Args:
         model: The world.
         draw: Where the hand draws the band to (y, z), frame O [m].
+        dips: Whether the hand lets the band back on its way, as `pull` has it.
         force_noise: Standard deviation of a force sample [N].
         depth_noise: Of a point of a cloud along each axis [m].
         seed: Of the noise.
@@ -42,7 +44,7 @@ def rehearse(
     Raises:
         UserError: The simulation fails.
     """
-    planned, rng = pull(model, draw), np.random.default_rng(seed)
+    planned, rng = pull(model, draw, dips=dips), np.random.default_rng(seed)
     simulated = simulate(model, planned)
     if simulated.failure:
         raise UserError(f"rehearse: {simulated.failure}")

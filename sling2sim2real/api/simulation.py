@@ -116,6 +116,7 @@ def pull(
     pull_time: float = 1.5,
     pause: float = 1.0,
     frame_rate: float = 30.0,
+    dips: bool = False,
 ) -> Episode:
     """A planned pull: the hand takes the hanging band, lifts it, draws it, pauses and lets go.
 
@@ -133,6 +134,7 @@ def pull(
         pull_time: For the way there [s].
         pause: From there to the release [s].
         frame_rate: Of the camera [Hz].
+        dips: Whether it lets the band back on its way, by `settings.plan.dips`.
 
     Raises:
         UserError: A time or a rate is not above 0.
@@ -141,4 +143,10 @@ def pull(
         raise UserError("pull: pull_time, pause and frame_rate must be above 0")
     hanging = hanging_guess(model.sling)[model.sling.middle, 2]
     inputs = model.settings.episode, model.band.name, hanging, draw
-    return planned_pull(*inputs, pull_time=pull_time, pause=pause, frame_rate=frame_rate)
+    return planned_pull(
+        *inputs,
+        pull_time=pull_time,
+        pause=pause,
+        frame_rate=frame_rate,
+        dips=model.settings.plan.dips if dips else (),
+    )

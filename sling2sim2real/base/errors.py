@@ -63,9 +63,10 @@ def _whose(path: str) -> str:
 
 # What extras of pyproject.toml bring, as it is imported.
 EXTRAS = {
-    "run": "botorch dvc fastapi gpytorch networkx numba onnx onnxscript prefect psutil"
+    "run": "botorch dvc fastapi gpytorch gymnasium networkx numba onnx onnxscript prefect psutil"
     " rsl_rl sksundae tensordict torch",
     "cluster": "dask dask_jobqueue distributed",
+    "view": "rerun",
 }
 
 
@@ -75,7 +76,8 @@ def absent(error: ModuleNotFoundError) -> str | None:
     for extra, names in EXTRAS.items():
         if name in names.split():
             how = f"pip install '.[{extra}]' -c constraints.txt in the project's folder"
-            return f"{name} is not installed: make setup, or {how}"
+            setup = "" if extra == "view" else "make setup, or "
+            return f"{name} is not installed: {setup}{how}"
     return None
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 
 from sling2sim2real.base.errors import UserError
 
@@ -16,6 +15,8 @@ def settle() -> None:
     """
     if os.access(os.path.expanduser("~"), os.W_OK | os.X_OK):
         return
+    import tempfile  # seldom needed, and slow
+
     try:
         folder = os.path.join(tempfile.gettempdir(), f"sling2sim2real-{os.getuid()}")
         os.makedirs(folder, mode=0o700, exist_ok=True)

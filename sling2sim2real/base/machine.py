@@ -1,7 +1,6 @@
 """Where simulations run: said by the environment, because results depend on it by rounding alone.
 
-SLING_DEVICE: cpu (default), cuda (all GPUs; CUDA_VISIBLE_DEVICES hides some), one such as cuda:0,
-or several such as cuda:0,cuda:2. Several share every batch; how many they are changes no result.
+SLING_DEVICE: cpu (default), or a GPU: cuda:0, cuda:1, ...; cuda is the first one.
 SLING_WORKERS: threads on the CPU (default: all cores that this process may use).
 """
 
@@ -20,39 +19,30 @@ from sling2sim2real.base.errors import UserError
 LIMIT = Path("/sys/fs/cgroup/cpu.max")
 
 
-def devices() -> tuple[str, ...]:
-    """Devices that SLING_DEVICE names, each by its own name. Raises UserError."""
+def device() -> str:
+    """The device that SLING_DEVICE names. Raises UserError."""
     return named(os.environ.get("SLING_DEVICE") or "cpu", "SLING_DEVICE")
 
 
 def kind() -> str:
     """cpu or cuda: what results depend on of SLING_DEVICE. Raises UserError."""
-    return devices()[0].partition(":")[0]
+    return device().partition(":")[0]
 
 
-def named(text: str, source: str) -> tuple[str, ...]:
-    """The devices that `text` names; `source` says where a user wrote it.
+def named(text: str, source: str) -> str:
+    """The device that `text` names; `source` says where a user wrote it.
 
-    Raises UserError where it names none, or one twice, or one that is not there.
+    Raises UserError where it names none, or one that is not there.
     """
-    names = tuple(text.split(","))
-    if names == ("cpu",):
-        return names
-    if names != ("cuda",) and not all(re.fullmatch("cuda:(0|[1-9][0-9]*)", name) for name in names):
-        raise UserError(
-            f"{source} must be cpu, cuda (all GPUs), cuda:0, or several such as cuda:0,cuda:2,"
-            f" got {text!r}"
-        )
-    if len(set(names)) < len(names):
-        raise UserError(f"{source} {text}: names a GPU twice")
-    there = gpus()
-    if not there:
-        raise UserError(f"{source} {text}: CUDA sees no GPU on this machine; take cpu")
-    names = there if names == ("cuda",) else names
-    missing = ", ".join(name for name in names if name not in there)
-    if missing:
-        raise UserError(f"{source} {text}: {missing} is not there; CUDA sees {', '.join(there)}")
-    return names
+    if text == "cpu":
+        return text
+    if not re.fullmatch("cuda(:(0|[1-9][0-9]*))?", text):
+        raise UserError(f"{source} must be cpu, or a GPU such as cuda:0, got {text!r}")
+    name, there = "cuda:0" if text == "cuda" else text, gpus()
+    if name not in there:
+        seen = f"CUDA sees {', '.join(there) or 'no GPU on this machine; take cpu'}"
+        raise UserError(f"{source} {text}: {name} is not there; {seen}")
+    return name
 
 
 def gpus() -> tuple[str, ...]:

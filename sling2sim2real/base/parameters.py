@@ -52,7 +52,7 @@ class Coordinate:
     Attributes:
         step: Of finite differences.
         prior: Mean and standard deviation of a Gaussian; None: even within the bounds.
-        half: The prior is half of that Gaussian: the parameter is not below its mean.
+        rectified: What of that Gaussian lies below its mean is at it: half of the prior.
         bounds: None: those of the method's box.
         log: The coordinate is the parameter's logarithm.
         name: Its own; "": the parameter's, `log_` before it where it is the logarithm.
@@ -60,7 +60,7 @@ class Coordinate:
 
     step: float
     prior: tuple[float, float] | None = None
-    half: bool = False
+    rectified: bool = False
     bounds: tuple[float, float] | None = None
     log: bool = False
     name: str = ""
@@ -124,7 +124,7 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         label="Mooney share",
         symbol="Mooney share",
         reach=(-1.0, 1.0),
-        box=(-0.3, 0.9),
+        box=(-1.0, 0.9),
         law=RUBBER,
         coordinate=Coordinate(0.02),
     ),
@@ -137,7 +137,7 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         law=RUBBER,
         coordinate=Coordinate(0.01),
     ),
-    # The half-normals: slow cycles of elastomers return 64 to 82 % (10.5281/zenodo.14717689), by
+    # Rectified: slow cycles of elastomers return 64 to 82 % (10.5281/zenodo.14717689), by
     # softening alone 1 - 0.59 s, and by flow alone 1 - 2 flow or more.
     Parameter(
         name="softening",
@@ -147,7 +147,7 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         reach=(0.0, 0.9),
         box=(0.0, 0.6),
         law=RUBBER,
-        coordinate=Coordinate(0.02, prior=(0.0, 0.3), half=True),
+        coordinate=Coordinate(0.02, prior=(0.0, 0.3), rectified=True),
     ),
     Parameter(
         name="relaxation",
@@ -167,7 +167,7 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         reach=(0.0, 1.0),
         box=(0.0, 0.6),
         law=RUBBER,
-        coordinate=Coordinate(0.01, prior=(0.0, 0.15), half=True),
+        coordinate=Coordinate(0.01, prior=(0.0, 0.15), rectified=True),
     ),
     Parameter(
         name="log_flow_rate",
@@ -227,7 +227,7 @@ TABLE: tuple[Quantity, ...] = (  # in the order of the cards
         si="1/s",
         reach=(0.0, 50.0),
         # little beside the cylinder's drag
-        coordinate=Coordinate(0.25, prior=(0.0, 1.0), half=True, bounds=(0.0, 8.0)),
+        coordinate=Coordinate(0.25, prior=(0.0, 1.0), rectified=True, bounds=(0.0, 8.0)),
     ),
     Parameter(
         name="turn_damping",

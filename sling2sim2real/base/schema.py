@@ -4,7 +4,6 @@ in one line.
 
 from __future__ import annotations
 
-import difflib
 import json
 import math
 from collections.abc import Hashable, Sequence
@@ -165,6 +164,8 @@ def _shown(value: object) -> str:
 
 def _closest(path: Sequence[str | int], model: type[Section]) -> str:
     """The known key that is most like the unknown one at the end of `path`."""
+    import difflib  # for a mistake alone
+
     kind: Any = model
     for part in path[:-1]:
         if isinstance(kind, type) and issubclass(kind, BaseModel):

@@ -12,7 +12,7 @@ from sling2sim2real.card.verdict import FURTHER, Findings
 from sling2sim2real.drawing.names import as_code, as_text
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.phases import NO_UNLOADING, phases_of_hand, unseen
-from sling2sim2real.identification.results.ranges import searched
+from sling2sim2real.identification.results.ranges import at_edges, searched
 from sling2sim2real.launching.trials.spread import LEVEL
 from sling2sim2real.quantities import QUANTITIES, rounded
 
@@ -140,10 +140,10 @@ def _odd(recordings: list[dict]) -> str:
 def _at_sides(inputs: CardInputs) -> list[tuple[str, str]]:
     """Searched parameters at an edge of their range: label and which edge."""
     at_sides, ranges = [], searched(inputs.params, inputs.method)
-    for name, value in inputs.theta["theta"].items():
-        if name in ranges and (side := ranges[name].edge(value)):
-            quantity, box = QUANTITIES[name], ranges[name]
-            low, high = (f"{rounded(quantity.factor * x):.6g}" for x in (box.low, box.high))
-            words = f"{side} side of its box, {low} to {high} {quantity.unit}".strip()
-            at_sides.append((quantity.label, words))
+    theta = inputs.theta["theta"]
+    for name, side in at_edges(inputs.params, inputs.method, theta).items():
+        quantity, box = QUANTITIES[name], ranges[name]
+        low, high = (f"{rounded(quantity.factor * x):.6g}" for x in (box.low, box.high))
+        words = f"{side} end of its bounds, {low} to {high} {quantity.unit}".strip()
+        at_sides.append((quantity.label, words))
     return at_sides

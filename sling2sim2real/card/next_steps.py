@@ -71,7 +71,7 @@ def next_steps(
             if gain.width < (1 - LEAST) * before:
                 steps.append(gain.text.format(**words, after=f"{_cm(gain.width)} cm"))
     if not steps:
-        steps.append("Nothing more would narrow the landings by much: launch.")
+        steps.append("No further measurement would narrow the landings by much: launch.")
     return steps[:MOST]
 
 
@@ -80,7 +80,7 @@ def _gains(
 ) -> Iterator[Gain]:
     single, more = (model.after(model.launched(aim, TAPE, count))[aim] for count in (1, LAUNCHES))
     yield Gain(
-        "Measure {a} launch and tell it with `sling observe`: {narrows} to {after}, with"
+        "Measure {a} launch and add it with `sling observe`: {narrows} to {after}, with"
         f" {LAUNCHES} launches to {_cm(more)} cm.",
         single,
     )
@@ -90,22 +90,18 @@ def _gains(
             model.after(model.known(DIP[0], spread=DIP[1]))[aim],
         )
     yield Gain(
-        "Record another pull like those that you have: {narrows} to about {after}.",
-        model.after(model.pulled(len(episodes)))[aim],
-    )
-    yield Gain(
-        "Take more pictures of the recoil, by a faster camera or by pulls that are seen at other"
-        " moments: with damping and drag known exactly, {narrows} to {after}.",
+        "Record more pictures of the recoil, by a faster camera or by more pulls. With damping and"
+        " drag known exactly, {narrows} to {after}.",
         model.after(model.known(*RECOIL))[aim],
     )
     if any(map(relaxing, episodes)):
         yield Gain(
-            "Pause longer before the release, for the force was still falling: with stiffness and"
-            " relaxation known exactly, {narrows} to {after}.",
+            "Pause longer before the release, because the force was still falling. With stiffness"
+            " and relaxation known exactly, {narrows} to {after}.",
             model.after(model.known(*PULL))[aim],
         )
     yield Gain(
-        "Draw more exactly: by an arm without error, {narrows} to {after}.",
+        "Position the hand more exactly: without any error of the draw, {narrows} to {after}.",
         model.after(draw=0.0)[aim],
     )
 

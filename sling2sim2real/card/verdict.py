@@ -40,17 +40,17 @@ SHARED, SURE, SHARE = 5, 0.05, 1 / 3
 _LEVEL = f"{100 * LEVEL:.0f} %"
 # Of the weight on the hand: bending makes it a fifth heavier on sound recordings.
 CARRIED = 1.5
-RUBBER = 900, 1300  # kg/m^3 of solid natural, silicone and latex rubber
+SOLID_RUBBER = 900, 1300  # kg/m^3 of solid natural, silicone and latex rubber
 # What is wrong where several of force, hand and recoil are missed.
 SIZES = (
-    "Weigh and measure the band again: mass, diameter and rest length are the first suspects where"
-    " force, hand and recoil are missed together."
+    "Weigh and measure the band again. Where force, drawn band and recoil are all off, its mass,"
+    " diameter or rest length is probably wrong."
 )
 # A band that softens when it is drawn returns less than its pull shows.
 UNSEEN = (
-    "no recording lets the drawn band back: what it softens, and so what a launch gets back, is"
-    " only what other rubbers have. Of the virtual ones that we tried, those that soften landed a"
-    " quarter short."
+    "no recording unloads the band before the release. So its softening, and the energy that a"
+    " launch gets back, are only assumed from other rubbers. In our tests, virtual rubbers that"
+    " soften landed a quarter short."
 )
 ODD_LAUNCH = 0.05  # of an evidence launch that the density leaves: a draw's error is some 2 %
 FAR_LAUNCH = 0.25  # of one: then the density has not taken it up
@@ -149,7 +149,7 @@ def judge(findings: Findings) -> tuple[str, list[Reason]]:
 
 def question(findings: Findings) -> str:
     """What to ask of a band whose mass and size are not those of solid rubber; else ""."""
-    low, high = RUBBER
+    low, high = SOLID_RUBBER
     if findings.density is None or low <= findings.density <= high:
         return ""
     return (
@@ -172,18 +172,18 @@ def reasons_of(findings: Findings, reasons: list[Reason]) -> list[str]:
         notes.append(inside(findings))
     if not findings.unloaded:
         notes.append(
-            "No recording lets the drawn band back, so that softening and flow keep their priors:"
-            " launches tell what they leave."
+            "No recording unloads the band, so softening and flow keep their priors. Measured"
+            " launches correct for this."
         )
     if findings.observed == 1:
-        notes.append("One launch is part of the evidence; one is not many.")
+        notes.append("The fit uses only one measured launch.")
     return notes
 
 
 def _met(findings: Findings) -> str:
     recoil = f", the recoil within {1000 * findings.recoil:.1f} mm" if findings.recoil_seen else ""
     return (
-        f"the force within {findings.force:.2f} N, the band in the hand within"
+        f"the force within {findings.force:.2f} N, the drawn band within"
         f" {1000 * findings.held:.1f} mm{recoil}"
     )
 
@@ -192,13 +192,11 @@ def inside(findings: Findings) -> str:
     """How many scored launches landed inside their intervals, and how far off in the mean."""
     if findings.scores == 1:
         side = "inside" if not findings.outside else "outside"
-        return (
-            f"The one {findings.kind} launch landed {side} its {_LEVEL} interval; one is not many."
-        )
+        return f"The only {findings.kind} launch landed {side} its {_LEVEL} interval."
     within = findings.scores - findings.outside
     return (
         f"{within} of {launches_of(findings.scores, findings.kind)} landed inside their {_LEVEL}"
-        f" intervals, {100 * findings.bias:+.1f} % from the prediction in the mean."
+        f" intervals, {100 * findings.bias:+.1f} % from the prediction on average."
     )
 
 
@@ -211,26 +209,26 @@ def _identified(findings: Findings):
     if findings.settled is None:
         yield Reason(
             False,
-            "This method does not tell how sure its values are.",
-            "Take the method `posterior`: it tells.",
+            "This method gives no uncertainty of its values.",
+            "Use the method `posterior`, which gives intervals.",
         )
-    elif not findings.settled:
+    elif not (findings.settled or findings.at_sides):
         yield Reason(
             False,
             "The fit had not settled when it ended, so values and intervals may still move.",
-            "Record a further pull: more evidence makes a fit settle.",
+            "Record another pull: more data makes a fit settle.",
         )
     elif findings.effective is not None and findings.effective < FEW_SAMPLES:
         yield Reason(
             False,
-            f"The intervals rest on {findings.effective:.0f} samples of even weight, too few to say"
-            " where they end.",
-            "Record a further pull: more evidence makes a density simpler.",
+            f"The effective sample size is {findings.effective:.0f}, too small to say where the"
+            " intervals end.",
+            "Record another pull: more data makes the posterior simpler.",
         )
     misfits = (
         ("force of the pull", findings.force, FORCE, "N", 1, "Check the force sensor and its frame,"
          " and the band's mass, diameter and rest length."),
-        ("band in the hand", findings.held, HELD, "mm", 1000, "Check the camera's calibration"
+        ("drawn band", findings.held, HELD, "mm", 1000, "Check the camera's calibration"
          " and where it stands (`/tf_static`, or `setup.camera_to_fork`)."),
         ("recoil", findings.recoil, RECOIL, "mm", 1000, "Check the camera's clock with `sling"
          " check`, and record another pull."),
@@ -238,15 +236,15 @@ def _identified(findings: Findings):
     if findings.carried is not None and not 1 / CARRIED < findings.carried < CARRIED:
         yield Reason(
             False,
-            f"Between grasp and pull the band weighed {findings.carried:.1f} times on the hand what"
-            " one of its mass would.",
+            f"Between grasp and pull, the weight on the hand was {findings.carried:.1f} times what"
+            " the band's mass gives.",
             "Weigh the band again, and check the unit and the zero of the force.",
         )
     missed = [misfit for misfit in misfits if misfit[1] > misfit[2]]
     for number, (what, size, limit, unit, factor, cure) in enumerate(missed):
-        how = "does not meet" if size > NO_FIT * limit else "meets only roughly"
+        how = "does not match" if size > NO_FIT * limit else "matches only roughly"
         text = (
-            f"The simulation {how} the {what}: {factor * size:.2g} {unit} off, where at most"
+            f"The simulation {how} the {what}: it is {factor * size:.2g} {unit} off, and at most"
             f" {factor * limit:.2g} {unit} are expected."
         )
         first = number == 0 and len(missed) > 1
@@ -254,24 +252,24 @@ def _identified(findings: Findings):
     if not findings.recoil_seen:
         yield Reason(
             False,
-            "No picture shows the recoil: its damping is only what other rubbers have.",
+            "No picture shows the recoil, so the damping is only assumed from other rubbers.",
             "Record another pull with the camera on until a second after the release.",
         )
     if findings.disagreement > DISAGREE:
-        odd = f"; {findings.odd} is the one that the others predict worst" if findings.odd else ""
+        odd = f" The others predict {findings.odd} worst." if findings.odd else ""
         yield Reason(
             False,
-            f"The recordings disagree {findings.disagreement:.1f} times as much as each leaves"
-            f" open{odd}.",
+            f"The recordings differ by {findings.disagreement:.1f} times their own uncertainty."
+            f"{odd}",
             "Find out what was different in the odd recording (another band, draw, clock or"
             " calibration), and leave it out if it is wrong.",
         )
     for label, side in findings.at_sides:
         yield Reason(
             False,
-            f"The value of {label} is at the {side}; the true one may lie beyond.",
-            f"Check mass, diameter and rest length of the band, else widen the box of {label}"
-            " (`settings`).",
+            f"The fitted {label} is at the {side}. The true value may lie outside.",
+            "Check the force sensor's frame, mass, diameter and rest length. If they are right,"
+            f" widen the bounds of {label} (`settings`).",
         )
 
 
@@ -285,7 +283,7 @@ def _launches(findings: Findings):
         yield Reason(
             share > MUCH_FURTHER,
             f"Launches stretch the band to {findings.stretch:.2f} times its length, the recording"
-            f" only to {findings.recorded_stretch:.2f}: beyond it the simulator guesses.",
+            f" only to {findings.recorded_stretch:.2f}: beyond it the simulator extrapolates.",
             f"Record a pull that stretches the band to {findings.stretch:.2f} times its length.",
         )
     if NEAR_LIMIT < findings.hold_force / findings.max_force <= 1:  # beyond, the launch fails
@@ -308,7 +306,7 @@ def _launches(findings: Findings):
             "Train it longer (`policy.iterations`), or widen the box of draws.",
         )
     if findings.half_width != findings.half_width and not findings.failures:
-        yield Reason(False, "How wide the landings scatter is not known.")
+        yield Reason(False, "The scatter of the landings is not known.")
     elif findings.half_width > WIDE:
         yield Reason(
             findings.half_width > HALF_AREA,
@@ -328,17 +326,17 @@ def _tried(findings: Findings):
                 findings.off > (WIDE if unlucky else HALF_AREA),
                 f"{findings.outside} of {launches_of(findings.scores, findings.kind)} landed"
                 f" outside the {_LEVEL} interval, {100 * findings.off:.0f} cm off"
-                f"{' in the mean' * (findings.scores > 1)}.",
-                "Tell the simulator of a launch with `sling observe`.",
+                f"{' on average' * (findings.scores > 1)}.",
+                "Add a measured launch with `sling observe`.",
             )
     if findings.biased:
         side = "short" if findings.bias < 0 else "long"
         yield Reason(
             False,
             f"The {findings.scores} {findings.kind} launches landed"
-            f" {abs(100 * findings.bias):.1f} % {side} in the mean, more than chance explains: they"
+            f" {abs(100 * findings.bias):.1f} % {side} on average, more than chance explains: they"
             " share a cause.",
-            "Tell the simulator of one launch with `sling observe`: it takes out what all share.",
+            "Add one measured launch with `sling observe`: it removes the error that all share.",
         )
     if (
         findings.surprising
@@ -346,15 +344,15 @@ def _tried(findings: Findings):
     ):
         yield Reason(
             False,
-            f"{findings.surprising} of {launches_of(findings.observed)} used as"
-            f" evidence landed outside the {_LEVEL} interval that everything else gives.",
+            f"{findings.surprising} of {launches_of(findings.observed)} used for the fit"
+            f" landed outside the {_LEVEL} interval that all other data give.",
             "Measure that launch again, and another one at the same draw: a wrong draw or landing"
             " shifts all predictions.",
         )
     if findings.left > ODD_LAUNCH:
         yield Reason(
             findings.left > FAR_LAUNCH,
-            f"A launch that is evidence is {100 * findings.left:.0f} % off what all evidence"
-            " together says.",
+            f"A launch used for the fit is {100 * findings.left:.0f} % off what all data"
+            " together predict.",
             "Measure that launch again: its draw or its landing may be wrong.",
         )

@@ -12,7 +12,7 @@ from sling2sim2real.base.errors import UserError
 
 COMMANDS = {  # what `python -m` runs in the folder of dvc.yaml, and what that does
     "flow": ("pipeline.flow", "run stale stages in parallel, as a flow of Prefect's"),
-    "ui": ("pipeline.flow.ui", "serve the Prefect UI, with past and present runs"),
+    "ui": ("pipeline.flow.server", "serve the Prefect UI, with past and present runs"),
     "verify": ("validation.verify", "compare the simulator with closed forms and other engines"),
     "bench": ("validation.bench", "measure rollouts and launches per second"),
 }

@@ -155,13 +155,6 @@ def setup(arguments: argparse.Namespace) -> Done:
         default=kinds.PULLS[0],
         help="with plan.dips (the default), or without",
     ),
-    flag(
-        "--precondition",
-        type=kinds.count,
-        default=0,
-        metavar="N",
-        help="stretch the band to the draw so often first, in the same grasp",
-    ),
     flag("--pulls", type=kinds.count, default=1, metavar="N", help="in one recording; default 1"),
     flag("--out", type=Path, metavar="FOLDER", help="default plan/, in the band's folder"),
     flag("--rate", type=kinds.rate, default=100.0, metavar="HZ", help="of the CSV; default 100"),
@@ -179,7 +172,6 @@ def plan(arguments: argparse.Namespace) -> Done:
         found=known.found,
         draw=arguments.draw,
         pull=arguments.pull,
-        precondition=arguments.precondition,
         pulls=arguments.pulls,
     )
     files = plan.write(arguments.out or Path(arguments.band or ".", "plan"), arguments.rate)
@@ -276,6 +268,13 @@ def observe(arguments: argparse.Namespace) -> Done:
         help="MuJoCo's XML (or: mujoco), numbers and a loader for Newton, PhysX's USD (or: physx)",
     ),
     flag("--out", type=Path, metavar="FOLDER", help="default exports/<target> in its folder"),
+    flag(
+        "--samples",
+        type=int,
+        default=0,
+        metavar="N",
+        help="also samples of the posterior as the engine's parameters, in samples.parquet",
+    ),
     JSON,
 )
 def export(arguments: argparse.Namespace) -> Done:
@@ -288,7 +287,7 @@ def export(arguments: argparse.Namespace) -> Done:
     folder = BandFolder.at(arguments.band)
     out = arguments.out or folder.path / "exports" / arguments.to
     expect_writable(out)
-    done = export(found, arguments.to, out, episode=folder.first_episode)
+    done = export(found, arguments.to, out, samples=arguments.samples)
     return kinds.shown(done.card, True) if arguments.json else shown(done.folder, done.card)
 
 

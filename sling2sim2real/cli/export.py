@@ -22,4 +22,10 @@ def shown(folder: Path, content: dict) -> str:
             f" {100 * HOLD_LIMIT:g} and {100 * LANDING_LIMIT:g} %, "
             + ("met" if content["met"] else "NOT met")
         )
+    if sampled := content.get("samples"):
+        lines += [
+            f"sample {row['sample']}: hold {100 * row['hold_force_error']:+.1f} %,"
+            f" landing {100 * row['landing_error']:+.1f} % there, at worst"
+            for row in sampled["replayed"]
+        ]
     return "\n".join(lines)

@@ -32,14 +32,10 @@ def view(folder: BandFolder, save: Path | None = None) -> str:
     """Open the viewer, or write what it shows into a file .rrd; return what was done, in words.
 
     Raises:
-        UserError: Rerun is not installed, or the folder keeps no episode.
+        UserError: The folder keeps no episode.
     """
-    try:
-        import rerun
-    except ImportError:
-        raise UserError(
-            "sling view: Rerun is not installed: pip install 'sling2sim2real[view]'"
-        ) from None
+    import rerun
+
     found, episode = Identification.load(folder.path), folder.first_episode
     if episode is None:
         raise UserError(f"{folder.path}: keeps no episode; `sling fit {folder.path}` makes it")

@@ -13,12 +13,11 @@ from typing import Any, Concatenate, ParamSpec
 
 import matplotlib.pyplot as plt
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.style import context
-from matplotlib.ticker import LogFormatter, MaxNLocator, NullFormatter, NullLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter, NullLocator
 from PIL import Image
 
 from sling2sim2real.base.files import replacing
@@ -44,13 +43,6 @@ def key(figure: Figure, entries: Iterable[tuple[str, Artist]], columns: int = 0,
     names, marks = zip(*entries, strict=True)
     more = {"loc": "outside lower center", "ncols": columns or len(names)} | more
     figure.legend(marks, names, **more)
-
-
-def log_y(ax: Axes) -> None:
-    """Logarithmic y axis with plain numbers."""
-    ax.set_yscale("log")
-    ax.yaxis.set_major_formatter("{x:g}")
-    ax.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.5, 0.5)))
 
 
 def few_ticks(axis) -> None:

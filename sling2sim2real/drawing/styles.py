@@ -37,9 +37,6 @@ KNOWN = {
     "package_si": ("Package SI", "#33673b"),
 }
 SPARE = ("#2e4057", "#8c8c8c", "#c2187b", "#00b5a0", "#5e35b1", "#9e9d24")  # of a user's methods
-# Rather than others where curves would crowd.
-DRAWN = ("posterior", "paper", "package_si", "real2sim2real")
-FEW = 2
 
 
 @dataclass(frozen=True)
@@ -57,14 +54,3 @@ def styles(methods: Iterable[str]) -> Styles:
     """A style for each method; one that the paper and we do not have keeps its own name."""
     spare = cycle(SPARE)
     return {m: Style(*(KNOWN.get(m) or (m, next(spare)))) for m in methods}
-
-
-def drawn(methods: Iterable[str]) -> list[str]:
-    """Which methods stand in pictures that can hold only FEW: ours, the paper's, its baselines.
-
-    In the order of `methods`.
-    """
-    methods = list(methods)
-    order = [*DRAWN, *methods]
-    chosen = sorted(methods, key=order.index)[:FEW]
-    return [method for method in methods if method in chosen]

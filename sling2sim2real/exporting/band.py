@@ -1,4 +1,4 @@
-"""What an export asks of a calibrated band, and a planned pull of it."""
+"""What an export asks of a calibrated band."""
 
 from __future__ import annotations
 
@@ -6,11 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
-from sling2sim2real.episode.episode import Episode
-from sling2sim2real.episode.planned import planned_pull
 from sling2sim2real.identification.results.theta import Mounting
 from sling2sim2real.settings import Settings
-from sling2sim2real.simulator.initial import hanging_guess
 from sling2sim2real.simulator.launch import Launches
 from sling2sim2real.simulator.model import BandSizes, ClampedBand, LaunchSetup
 from sling2sim2real.simulator.parameters import Parameters
@@ -38,12 +35,6 @@ class CalibratedBand(Protocol):
     def sling(self) -> ClampedBand: ...
     @property
     def launch_setup(self) -> LaunchSetup: ...
-    def launches(self, draws: np.ndarray) -> Launches:
-        """Launch draws (N, 2) [m]."""
+    def launches(self, draws: np.ndarray, points: np.ndarray | None = None) -> Launches:
+        """Launch draws (N, 2) [m], each with a θ of its own where `points` (N, P) are given."""
         ...
-
-
-def pull_to(model: CalibratedBand, draw: tuple[float, float]) -> Episode:
-    """A planned pull to a draw (y, z), frame O [m]."""
-    hanging = hanging_guess(model.sling)[model.sling.middle, 2]
-    return planned_pull(model.settings.episode, model.band.name, hanging, draw)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ from sling2sim2real.exporting.band import CalibratedBand
 from sling2sim2real.exporting.chain import MATCHED
 from sling2sim2real.exporting.match import HOLD_LIMIT, LANDING_LIMIT, DrawCompared
 from sling2sim2real.exporting.proof import Matched
-from sling2sim2real.exporting.states import state_changes
 from sling2sim2real.quantities import QUANTITIES, rounded
 
 UNITS = {"hold_force": "n", "speed": "m_s", "landing": "m"}  # in names of keys
@@ -50,11 +48,6 @@ def content(model: CalibratedBand, done: Matched, target: str, files: dict[str, 
         "met": done.met,
         "proof": list(map(compared_row, done.proof)),
         "match": list(map(compared_row, done.match)),
-        "pull": {
-            name: value if value is None else rounded(value)
-            for name, value in asdict(done.pull).items()
-        },
-        "other_states": state_changes(model, np.array([row.draw for row in done.proof])),
         "without_slot": export_values.without_slot(model),
     }
 

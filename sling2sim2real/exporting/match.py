@@ -71,9 +71,15 @@ def within_limits(proof: Sequence[DrawCompared]) -> bool:
     )
 
 
-def compared(model: CalibratedBand, draws: np.ndarray, shots: list[Shot]) -> list[DrawCompared]:
-    """Shots of draws (N, 2) beside what the calibrated simulation does there."""
-    done = model.launches(draws)
+def compared(
+    model: CalibratedBand, draws: np.ndarray, shots: list[Shot], theta: np.ndarray | None = None
+) -> list[DrawCompared]:
+    """Shots of draws (N, 2) beside what the calibrated simulation does there.
+
+    Args:
+        theta: Other than the model's, shape (P,).
+    """
+    done = model.launches(draws, None if theta is None else np.tile(theta, (len(draws), 1)))
     return [
         DrawCompared(
             draw=(float(draw[0]), float(draw[1])),

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from sling2sim2real.simulator.cylinder import cylinder, volumes
 from sling2sim2real.simulator.initial import fixed_frames, hanging_line
-from sling2sim2real.simulator.interaction import blend
 from sling2sim2real.simulator.model import ClampedBand
 
 CLAMPED_LENGTH_M = 0.015  # m of band in each clamp
@@ -85,17 +83,6 @@ class Tube:
     @property
     def _rows(self) -> np.ndarray:
         return np.arange(self.mass.size).reshape(self.rest.shape[:2])
-
-
-def hand_path(episode, times: np.ndarray, grasp: np.ndarray) -> np.ndarray:
-    """Where the held section is at `times` (S,): on the hand's path, after a blend from `grasp`.
-
-    Returns:
-        Its centre [m], shape (S, 3), as sling.interaction leads it.
-    """
-    inside = np.clip(times, episode.time[0], episode.time[-1])
-    path = CubicSpline(episode.time, episode.position, axis=0)(inside)
-    return path + blend(times, episode)[:, None] * (grasp - path[0])
 
 
 def _hanging(sling: ClampedBand, arc: np.ndarray, rest: np.ndarray) -> np.ndarray:

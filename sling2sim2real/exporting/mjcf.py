@@ -55,6 +55,17 @@ def text(name: str, chain: SpringChain, keys: Mapping[str, Mapping] | None = Non
     return xml.tostring(root, encoding="unicode") + "\n"
 
 
+def sample(chain: SpringChain) -> dict[str, float | list[float]]:
+    """What a sample changes of the file: stiffness of both tendons of a spring, damping, step."""
+    first, second, _, _ = chain.cubic_springs()
+    return {
+        "spring": first.tolist(),
+        "further": second.tolist(),
+        "damping": chain.damping,
+        "time_step_s": chain.step,
+    }
+
+
 def _defaults(root: xml.Element, chain: SpringChain) -> None:
     """Springs pull and never push; what is tied is tied within two steps."""
     defaults = xml.SubElement(root, "default")

@@ -1,4 +1,4 @@
-"""Draw, launch and pull the exported band in MuJoCo, with what its file holds alone."""
+"""Draw and launch the exported band in MuJoCo, with what its file holds alone."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import numpy as np
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.exporting import mjcf
 from sling2sim2real.exporting.chain import SpringChain
-from sling2sim2real.exporting.mjcf import HAND_MASS_KG, RIGID_HAND_N_PER_M
-from sling2sim2real.exporting.replay import HANG_S, HandPath, Pulled, Shot
+from sling2sim2real.exporting.replay import Shot
 from sling2sim2real.simulator.launch import ballistic_landing
 
+HANG_S = 3.0  # s for the slack band
 SETTLE_S, BRAKE_PER_S = 0.25, 250.0  # s and 1/s: how long and how a drawn band is brought to rest
 LONGEST_RECOIL_S = 0.5  # s from a release until nothing has left the pouch
 
@@ -117,25 +117,6 @@ class MujocoBand:
             after = self._flying()[0]
         part = (before[2] - self.chain.floor) / (before[2] - after[2])
         return before[1] + part * (after[1] - before[1])
-
-    def pull(self, path: HandPath, times: np.ndarray, stamps: np.ndarray) -> Pulled:
-        """Pull as ChainReplay.pull does."""
-        self.hang()
-        gain, brake = RIGID_HAND_N_PER_M, 2 * np.sqrt(RIGID_HAND_N_PER_M * HAND_MASS_KG)
-        before = self.model.actuator_gainprm.copy(), self.model.actuator_biasprm.copy()
-        self.model.actuator_gainprm[:, 0] = gain
-        self.model.actuator_biasprm[:, 1:3] = -gain, -brake
-        self.data.eq_active[[self._hold, self._pouch]] = 1, 0
-        places = path(self.line[self.chain.edges // 2])
-        looks = np.searchsorted(times, stamps)
-        force, lines = np.empty((len(times), 3)), []
-        for i, place in enumerate(places):
-            self.data.ctrl[:] = place
-            self._step(self.model, self.data)
-            force[i] = self.force
-            lines += [self.line] * int(np.count_nonzero(looks == i))
-        self.model.actuator_gainprm[:], self.model.actuator_biasprm[:] = before
-        return Pulled(times, force, np.array(lines))
 
     def _put(self, line: np.ndarray, held: bool, pouch: bool) -> None:
         """The band at rest through nodes (edges + 1, 3), hand and projectile at its middle."""

@@ -157,7 +157,8 @@ class SpringBands:
         n.strength = numbers_known["strength_n"]
         n.share, n.upturn = numbers_known["mooney_share"], numbers_known["upturn"]
         n.damping = numbers_known["damping_time_s"]
-        self.arm_stiffness = numbers_known["arm_stiffness_n_per_m"] or RIGID_HAND_N_PER_M
+        n.stiffness = numbers_known["arm_stiffness_n_per_m"] or RIGID_HAND_N_PER_M
+        n.hand_damping = 2 * np.sqrt(n.stiffness * HAND_MASS_KG)
         n.hand_mass, n.gravity = HAND_MASS_KG, GRAVITY
         half = numbers_known["half_width_m"]
         self.tips = np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
@@ -184,12 +185,6 @@ class SpringBands:
         self._brake = wp.zeros(1, dtype=wp.float32, device=device)
         self._landing = wp.zeros(count, dtype=wp.float32, device=device)
         self.device = device
-        self.drive(self.arm_stiffness)
-
-    def drive(self, stiffness: float) -> None:
-        """How stiff the hand's drive is [N/m]."""
-        self._n.stiffness = stiffness
-        self._n.hand_damping = 2 * np.sqrt(stiffness * HAND_MASS_KG)
 
     def draw(self, draws) -> np.ndarray:
         """Hold the bands with projectiles, at rest; hands are sent to (y, z), `draws` (N, 2).

@@ -1,4 +1,4 @@
-"""Draw, launch and pull the exported band in Newton, with what its files hold alone."""
+"""Draw and launch the exported band in Newton, with what its files hold alone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.exporting.chain import SpringChain
-from sling2sim2real.exporting.replay import HANG_S, HandPath, Pulled, Shot
+from sling2sim2real.exporting.replay import Shot
 
 
 def numbers(name: str, chain: SpringChain, draws: np.ndarray) -> dict:
@@ -32,6 +32,13 @@ def numbers(name: str, chain: SpringChain, draws: np.ndarray) -> dict:
         "time_step_s": chain.step,
         "draws_m": np.asarray(draws).tolist(),
     }
+
+
+def sample(chain: SpringChain) -> dict[str, float]:
+    """What a sample changes of them."""
+    changed = "strength_n", "mooney_share", "damping_time_s", "time_step_s"
+    known = numbers("", chain, np.empty((0, 2)))
+    return {name: known[name] for name in changed}
 
 
 class NewtonReplay:
@@ -60,27 +67,6 @@ class NewtonReplay:
         speed, angle = np.linalg.norm(left, axis=1), np.arctan2(left[:, 2], left[:, 1])
         columns = np.stack([landing, speed, angle, hold_force], axis=1)
         return [Shot(*row) for row in columns.tolist()]
-
-    def pull(self, path: HandPath, times: np.ndarray, stamps: np.ndarray) -> Pulled:
-        """Pull as ChainReplay.pull does."""
-        bands = self._module.SpringBands(self._numbers, device=self.device)
-        middle = self.chain.edges // 2
-        bands.put([self.chain.hanging()], held=False)
-        bands.settle(HANG_S)
-        bands.put(bands.lines, loaded=False)
-        bands.drive(self._module.RIGID_HAND_N_PER_M)
-        looks = np.searchsorted(times, stamps)
-        force, lines = np.empty((len(times), 3)), []
-        now, after = bands.states
-        for i, place in enumerate(path(bands.lines[0, middle])):
-            bands.lead(place[None])
-            bands.advance(now, after)
-            now, after = after, now
-            force[i] = bands.force[0]
-            seen = int(np.count_nonzero(looks == i))
-            if seen:
-                lines += [now.particle_q.numpy()[:-1].astype(float)] * seen
-        return Pulled(times, force, np.array(lines))
 
 
 def loader() -> ModuleType:

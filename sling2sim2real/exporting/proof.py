@@ -7,11 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sling2sim2real.episode.episode import Episode
-from sling2sim2real.exporting.band import CalibratedBand, pull_to
+from sling2sim2real.exporting.band import CalibratedBand
 from sling2sim2real.exporting.chain import SpringChain
 from sling2sim2real.exporting.match import DrawCompared, compared, draws_of, within_limits
-from sling2sim2real.exporting.pull import PullCompared, compare_pull
 from sling2sim2real.exporting.replay import ChainReplay
 
 
@@ -23,7 +21,6 @@ class Matched:
         chain: Matched.
         match: Draws that it was matched to.
         proof: Draws that it was not, flown to the floor.
-        pull: The same pull in both.
         finer: Largest relative change of the proof's landings with half the time step.
         engine: Name and version.
     """
@@ -31,7 +28,6 @@ class Matched:
     chain: SpringChain
     match: Sequence[DrawCompared]
     proof: Sequence[DrawCompared]
-    pull: PullCompared
     finer: float
     engine: str
 
@@ -40,14 +36,8 @@ class Matched:
         return within_limits(self.proof)
 
 
-def proven(
-    model: CalibratedBand, replay: ChainReplay, proof: np.ndarray, episode: Episode | None
-) -> Matched:
-    """Launch the match's draws and those of `proof` (N, 2), and pull as in the episode.
-
-    Args:
-        episode: None: a planned pull to the last draw of the proof.
-    """
+def proven(model: CalibratedBand, replay: ChainReplay, proof: np.ndarray) -> Matched:
+    """Launch the match's draws and those of `proof` (N, 2)."""
     (draws, _), shots = draws_of(model), replay.launches(proof, fly=True)
     finer = replay.finer.launches(proof)
     moved = [half.landing / shot.landing - 1 for half, shot in zip(finer, shots, strict=True)]
@@ -55,7 +45,6 @@ def proven(
         chain=replay.chain,
         match=compared(model, draws, replay.launches(draws)),
         proof=compared(model, proof, shots),
-        pull=compare_pull(model, episode or pull_to(model, tuple(proof[-1])), replay),
         finer=max(map(abs, moved)),
         engine=replay.engine,
     )

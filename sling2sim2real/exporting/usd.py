@@ -28,7 +28,6 @@ import numpy as np
 
 from sling2sim2real.base.files import write_json, write_text
 from sling2sim2real.base.imported import imported
-from sling2sim2real.episode.episode import Episode
 from sling2sim2real.exporting import values as export_values
 from sling2sim2real.exporting.band import CalibratedBand
 from sling2sim2real.exporting.card import ASKED, compared_row, readme
@@ -100,7 +99,7 @@ class UsdMatch:
         return within_limits(self.proof)
 
 
-def to_usd(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
+def to_usd(model: CalibratedBand, folder: Path, _: int) -> dict:
     """<band>.usda, nodes.json, and README.md: what it is, and what it is not."""
     draws, ours = near_draws(model)
     tension, stretch = SpringChain.tension(model, draws, ours.hold_force)

@@ -3,7 +3,8 @@
 A search is a function `search(evaluate, dimension, *, rollouts, seed, population, **settings)`. It
 knows only the unit cube of the axes that are free, and calls `evaluate(points) -> losses` with
 batches of any size; everything that it evaluates is kept, so it returns nothing. Ours lie in
-searches/; params.yaml names one of a user's own as `package.module:function`.
+searches/, and settings/identification.py names them; params.yaml names one of a user's own as
+`package.module:function`.
 """
 
 from __future__ import annotations
@@ -20,16 +21,7 @@ from sling2sim2real.identification.objective.box import SearchBox, latin_hypercu
 from sling2sim2real.identification.objective.evaluate import Evaluation
 from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.settings import Settings
-from sling2sim2real.settings.identification import POSTERIOR
-
-FOLDER = "sling2sim2real.identification.searches"
-OURS = {  # what their rows are called, and where they are
-    "multistart": ("de", f"{FOLDER}.de:differential_evolution"),
-    POSTERIOR: ("design", f"{__name__}:design"),
-    "de": ("de", f"{FOLDER}.de:differential_evolution"),
-    "bo": ("bo", f"{FOLDER}.bo:bayesian"),
-    "adam": ("adam", f"{FOLDER}.adam:adam"),
-}
+from sling2sim2real.settings.identification import POSTERIOR, SEARCHES
 
 
 class Evaluate(Protocol):
@@ -164,7 +156,7 @@ def function_of(name: str) -> tuple[str, Callable[..., None]]:
     Raises:
         UserError: There is no such function.
     """
-    phase, place = OURS.get(name, (name.rpartition(":")[2], name))
+    phase, place = SEARCHES.get(name, (name.rpartition(":")[2], name))
     try:
         return phase, imported(place)
     except Exception as error:  # a module of the user's may raise anything

@@ -49,7 +49,7 @@ def make_policy(
     )
     surface = landing_map.surface
     if settings.landings == "simulated":  # the map then shows what the simulator does, no more
-        surface = SimulatedLandings(launcher, surface)
+        surface = SimulatedLandings(launcher, params.setup)
     seen = settings.state == "projectile_target"
     start = projectile_start(params.setup, params.bands[band]) if seen else None
     trained = train(surface, settings, progress, projectile=start)

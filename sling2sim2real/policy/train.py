@@ -24,8 +24,8 @@ from torch import nn
 from sling2sim2real.base.machine import one_thread
 from sling2sim2real.base.progress import Advancing
 from sling2sim2real.launching.surface.simulated import Source
-from sling2sim2real.policy.environment import SlingshotEnv, draw_box, rewarded
-from sling2sim2real.policy.ppo import settings
+from sling2sim2real.policy.environment import SlingshotVectorEnv, draw_box, rewarded
+from sling2sim2real.policy.ppo import RslEnv, settings
 from sling2sim2real.settings.launches import PolicyParams, Reward
 
 CHECKED_TARGETS = 256
@@ -54,7 +54,7 @@ class Policy(nn.Module):
     ) -> None:
         super().__init__()
         low, high = targets
-        center, half = draw_box(surface)
+        center, half = map(torch.from_numpy, draw_box(surface))
         self.network = network
         self.register_buffer("target_center", torch.tensor([(low + high) / 2]))
         self.register_buffer("target_half", torch.tensor([(high - low) / 2]))
@@ -122,14 +122,14 @@ def train(
     """
     with one_thread():
         torch.manual_seed(params.seed)
-        env = SlingshotEnv(
+        launches = SlingshotVectorEnv(
             surface,
             targets=params.targets,
             num_envs=params.envs,
             reward=params.reward,
-            seed=params.seed,
             projectile=projectile,
         )
+        env = RslEnv(launches, params.seed)
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
             configured = settings(params, env.groups)
             ppo = PPO.construct_algorithm(env.get_observations(), env, configured, "cpu")
@@ -141,8 +141,7 @@ def train(
         best, chosen, weights = -np.inf, 0, {}
         for number, next_log_std in enumerate(_next_log_stds(params)):
             mean_reward = _iterate(ppo, env, params.steps)
-            failures = env.take_failures()
-            reasons.update(failures)
+            reasons.update(env.failures)
             worth, error, failed = earned(surface, policy.draws(checked), checked, params.reward)
             rows.append(
                 {
@@ -150,11 +149,12 @@ def train(
                     "mean_reward": mean_reward,
                     "mean_error": error,
                     "failed_targets": failed,
-                    "failures": sum(failures.values()),
+                    "failures": env.failures.total(),
                     "learning_rate": float(ppo.learning_rate),
                     "std": float(network.output_std.detach().mean()),
                 }
             )
+            env.failures.clear()
             if next_log_std is not None:
                 with torch.no_grad():
                     network.distribution.log_std_param.fill_(next_log_std)
@@ -172,7 +172,7 @@ def train(
     )
 
 
-def _iterate(ppo: PPO, env: SlingshotEnv, steps: int) -> float:
+def _iterate(ppo: PPO, env: RslEnv, steps: int) -> float:
     """Launch by the exploring policy and improve it; mean reward of the launches.
 
     The loop of rsl_rl's OnPolicyRunner, which logs the last 100 episodes only and has no place for

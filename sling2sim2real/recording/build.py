@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -171,23 +170,16 @@ def episode_of(done: Processed, band_name: str) -> Episode:
     pull, signals, clouds = whole.pull, whole.signals, whole.clouds
     recording, geometry = pull.recording, pull.geometry
 
-    def of_streams(name: str) -> dict[str, Any]:
-        return {role: getattr(stream, name) for role, stream in recording.streams.items()}
-
     metadata = {
         "input": {
             "file": recording.path.name,
             "pull": pull.number,
             "sha256": recording.sha256,
             "start_ns": signals.origin,
-            "topics": of_streams("topic"),
+            "topics": {role: stream.topic for role, stream in recording.streams.items()},
             "choices": recording.choices,
             "frames": geometry.sources,
-            "delays": of_streams("receipt_delay"),
-            "lost": of_streams("lost"),
-            "missing": of_streams("missing"),
             "losses": recording.losses,
-            "notes": recording.notes,
         },
         "cautions": [caution.content() for caution in done.cautions],
         "geometry": EpisodeGeometry.of(recording, geometry).content(),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable
 from dataclasses import dataclass, replace
 
 import cv2
@@ -13,7 +12,6 @@ from sling2sim2real.base.errors import UserError
 
 LARGEST = 2**24  # pixels; a damaged size must not ask for more memory than this
 PINHOLE = ("", "plumb_bob", "rational_polynomial")
-FISHEYE = ("fisheye", "equidistant", "kannala_brandt")
 RECTIFIED = re.compile("(^|[/_])rect(ified)?([/_]|$)")  # as image_proc names topics
 COUNTS = (4, 5, 8, 12, 14)  # of coefficients that OpenCV's pinhole model takes
 UNDISTORT = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 40, 1e-9)
@@ -21,14 +19,13 @@ UNDISTORT = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 40, 1e-9)
 
 @dataclass(frozen=True)
 class Camera:
-    """Intrinsics: a pinhole with OpenCV's distortion, or OpenCV's fisheye.
+    """Intrinsics: a pinhole with OpenCV's distortion.
 
     Attributes:
         width, height: Pixels.
         matrix: Shape (3, 3).
-        distortion: 0, 4, 5, 8, 12 or 14 coefficients (4 of a fisheye), in OpenCV's order.
+        distortion: 0, 4, 5, 8, 12 or 14 coefficients, in OpenCV's order.
         frame: The optical frame.
-        fisheye: Which of the two models.
     """
 
     width: int
@@ -36,18 +33,14 @@ class Camera:
     matrix: np.ndarray
     distortion: np.ndarray
     frame: str
-    fisheye: bool = False
 
     def rays(self) -> np.ndarray:
         """What each pixel looks along, scaled to z = 1, shape (H, W, 3)."""
         u, v = np.meshgrid(np.arange(self.width), np.arange(self.height))
         pixels = np.stack([u, v], axis=-1).reshape(-1, 1, 2).astype(np.float64)
-        if self.fisheye:
-            rays = cv2.fisheye.undistortPoints(pixels, self.matrix, self.distortion)
-        else:
-            rays = cv2.undistortPoints(
-                pixels, self.matrix, self.distortion, None, None, None, UNDISTORT
-            )
+        rays = cv2.undistortPoints(
+            pixels, self.matrix, self.distortion, None, None, None, UNDISTORT
+        )
         rays = cv2.convertPointsToHomogeneous(rays)
         return rays.reshape(self.height, self.width, 3)
 
@@ -56,8 +49,8 @@ class Camera:
         if not len(points):
             return np.zeros((0, 2))
         points = np.asarray(points, np.float64).reshape(-1, 1, 3)
-        model, still = cv2.fisheye if self.fisheye else cv2, np.zeros(3)
-        pixels, _ = model.projectPoints(points, still, still, self.matrix, self.distortion)
+        still = np.zeros(3)
+        pixels, _ = cv2.projectPoints(points, still, still, self.matrix, self.distortion)
         return pixels.reshape(-1, 2)
 
     def window(self, low: np.ndarray, high: np.ndarray) -> tuple[slice, slice]:
@@ -80,13 +73,6 @@ class Calibration:
     camera: Camera
     model: str
     rectified: np.ndarray
-
-    @property
-    def kind(self) -> tuple[Hashable, ...]:
-        """Everything: a calibration does not change."""
-        camera = self.camera
-        numbers = (*camera.matrix.flat, *camera.distortion, *self.rectified.flat)
-        return camera.width, camera.height, numbers, self.model
 
 
 def camera_from(
@@ -119,14 +105,10 @@ def camera_from(
     if not camera.distortion.any():
         camera = replace(camera, distortion=np.zeros(0))
     count = len(camera.distortion)
-    if count and model in FISHEYE:
-        camera = replace(camera, fisheye=True)
-    if count and (
-        model not in PINHOLE + FISHEYE or count not in ((4,) if camera.fisheye else COUNTS)
-    ):
+    if count and (model not in PINHOLE or count not in COUNTS):
         raise UserError(
-            f"{topic} has distortion model {calibration.model!r} with {count}"
-            " coefficients, publish plumb_bob (5), rational_polynomial (8) or equidistant (4)"
+            f"{topic} has distortion model {calibration.model!r} with {count} coefficients: publish"
+            " plumb_bob (5) or rational_polynomial (8), or rectified images (of a fisheye)"
         )
     if size not in (None, (camera.width, camera.height)):
         raise UserError(

@@ -15,7 +15,7 @@ from sling2sim2real.recording.calibration import MATTERS, Calibration
 from sling2sim2real.recording.calibration import SURE as SHIFT_SURE
 from sling2sim2real.recording.clouds import Clouds, PictureLine, by_phase
 from sling2sim2real.recording.delays import Delays
-from sling2sim2real.recording.events import CALM, RUBBER, SETTLE, Part, Pull
+from sling2sim2real.recording.events import CALM, OPENING, SETTLE, Part, Pull
 from sling2sim2real.recording.force import QUIET, flat_top
 from sling2sim2real.recording.frames import Geometry
 from sling2sim2real.recording.hold import Hold, hold_of
@@ -162,7 +162,7 @@ TABLE = (
     Check("filter",
         "how long the force falls at the release, and its noise, with an unfiltered sensor's",
         "the time between samples",
-        f"{1e3 * RUBBER:g} ms, or three samples where neighbouring ones have the same noise",
+        f"{1e3 * OPENING:g} ms, or three samples where neighbouring ones have the same noise",
         f"{1e3 * LATE:g} ms",
         "record the sensor's own, unfiltered force"),
     Check("zero",

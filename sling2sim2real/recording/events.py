@@ -37,7 +37,7 @@ LEAST_LEAD_IN = 0.2  # s of the empty hand before the grasp, at least: the force
 SETTLE = 0.4  # s after the release until the hand is free and at rest
 CALM = 3.0  # s after a release until the band hangs at rest again, to some 2 mm
 APART = 1.0  # s: what is let go twice within this is one pull, and not understood
-RUBBER = 0.006  # s: pads open in less, and rubber follows them at once
+OPENING = 0.006  # s: pads open in less, and rubber follows them at once
 
 
 @dataclass(frozen=True)
@@ -433,7 +433,7 @@ def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = Non
     slips = [float(t[i]) for i in drops.at if i < center]
     spread = _fall_time(t, along, half, *(level - drop * (1 - share) for share in RELEASE.timed))
     filtered = spread > RELEASE.periods * period and (
-        spread > RUBBER or _alike(along[quiet]) > RELEASE.alike
+        spread > OPENING or _alike(along[quiet]) > RELEASE.alike
     )
     if filtered:  # it may have been applied forwards, or both ways
         error = float(np.hypot(error, spread / 2))

@@ -10,8 +10,7 @@ loss, which may cost messages, or a note, which costs none:
 
 - An MCAP chunk whose checksum, size or records are wrong is dropped whole; the rest is used.
 - An MCAP file without an end is read up to where it was cut, and one with bytes that are no record
-  up to these. No index is needed.
-- Where nothing has a checksum, a note says that damage would not be noticed.
+  up to these. No index is needed. Where nothing has a checksum, damage may pass unnoticed.
 
 https://mcap.dev/spec
 """
@@ -24,7 +23,6 @@ import struct
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from typing import BinaryIO
 
@@ -60,8 +58,6 @@ OTHERS = {  # by its first bytes: what it is, and how to mend it
     b"\x1f\x8b": "packed by gzip: unpack it (`gunzip`)",
     b"\x04\x22\x4d\x18": "packed by LZ4: unpack it (`lz4 -d`)",
     b"PK\x03\x04": "a ZIP archive: unpack it",
-    b"\xfd7zXZ": "packed by xz: unpack it (`xz -d`)",
-    b"BZh": "packed by bzip2: unpack it (`bunzip2`)",
 }
 
 
@@ -116,12 +112,7 @@ def read_container(path: Path) -> Container:
             raise UserError(f"{part}: cannot be read ({error.strerror})") from error
         name = f"{part.name}: " if len(parts) > 1 else ""
         losses += [f"{name}{loss}" for loss in read.losses()]
-        if not read.checked and NO_CHECKSUMS not in notes:
-            notes.append(NO_CHECKSUMS)
     return Container(path, list(topics.by_kind.values()), losses, notes)
-
-
-NO_CHECKSUMS = "no checksums in the file: damage to its messages would not be noticed"
 
 
 class _Whole:
@@ -141,9 +132,8 @@ class _Mcap:
     """Reads an MCAP file, record by record, and keeps what was in the way.
 
     Attributes:
-        checked: Whether anything has a checksum.
         dropped: First and last log times of damaged chunks [ns].
-        orphans: How many messages no record before them explains.
+        read: How many messages.
         said: Messages that the file's end speaks of; None where it does not.
         stopped: What ended the reading, in words.
     """
@@ -154,9 +144,8 @@ class _Mcap:
         self.channels: dict[int, kinds.Channel] = {}
         self.dropped: list[tuple[int, int]] = []
         self.said: int | None = None
-        self.read, self.orphans, self.first, self.last = 0, 0, 0, 0
-        self.checked = ended = False
-        self.stopped = ""
+        self.read, self.first, self.last = 0, 0, 0
+        self.stopped, ended = "", False
         with suppress(*DAMAGE, OSError):  # the end repeats what a damaged chunk may have said
             if summary := make_reader(file, validate_crcs=True).get_summary():
                 self.schemas |= summary.schemas
@@ -177,45 +166,43 @@ class _Mcap:
     def _records(self, file: BinaryIO) -> Iterator[kinds.McapRecord]:
         reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=LIMIT)
         for record in reader.records:
-            yield record
-            if isinstance(record, kinds.Chunk):
-                try:
-                    if record.uncompressed_size > LIMIT:
-                        raise ValueError("a chunk that is too large")
-                    inside = breakup_chunk(record, validate_crc=True)
-                except DAMAGE:
-                    self.dropped.append((record.message_start_time, record.message_end_time))
-                else:
-                    yield from inside
+            if not isinstance(record, kinds.Chunk):
+                yield record
+                continue
+            try:
+                if record.uncompressed_size > LIMIT:
+                    raise ValueError("a chunk that is too large")
+                inside = breakup_chunk(record, validate_crc=True)
+            except DAMAGE:
+                self.dropped.append((record.message_start_time, record.message_end_time))
+            else:
+                yield from inside
 
     def _take(self, record: kinds.McapRecord) -> None:
         if isinstance(record, kinds.Message):
             self.read += 1
-            topic = self.bound.get(record.channel_id) or self._bind(record.channel_id)
-            if topic is None:
-                self.orphans += 1
-                return
-            topic.add(record.log_time, record.data)
-            self.first = self.first or record.log_time
-            self.last = max(self.last, record.log_time)
-        elif isinstance(record, kinds.Chunk):
-            self.checked |= record.uncompressed_crc != 0
+            topic = self._topic_of(record.channel_id)
+            if topic is not None:
+                topic.add(record.log_time, record.data)
+                self.first = self.first or record.log_time
+                self.last = max(self.last, record.log_time)
         elif isinstance(record, kinds.Schema):
             self.schemas[record.id] = record
         elif isinstance(record, kinds.Channel):
             self.channels[record.id] = record
         elif isinstance(record, kinds.Statistics):
             self.said = record.message_count
-        elif isinstance(record, kinds.DataEnd):
-            self.checked |= record.data_section_crc != 0
 
-    def _bind(self, number: int) -> Topic | None:
-        """Find the topic of a channel, which stays the first that was said to be of this number."""
-        channel = self.channels.get(number)
-        schema = self.schemas.get(channel.schema_id) if channel else None
-        if channel is None or schema is None:
-            return None
-        self.bound[number] = self.topics.of(channel.topic, schema, channel.message_encoding)
+    def _topic_of(self, number: int) -> Topic | None:
+        """Of a channel, which stays the first of this number; None where nothing says what it is,
+        as where a damaged chunk did.
+        """
+        if number not in self.bound:
+            channel = self.channels.get(number)
+            schema = self.schemas.get(channel.schema_id) if channel else None
+            if channel is None or schema is None:
+                return None
+            self.bound[number] = self.topics.of(channel.topic, schema, channel.message_encoding)
         return self.bound[number]
 
     def losses(self) -> list[str]:
@@ -225,11 +212,7 @@ class _Mcap:
             count = counted(len(where), "damaged chunk")
             losses.append(f"{count} dropped: {few(where, NAMED)}")
         if self.said not in (None, self.read):
-            losses.append(
-                f"messages read of those that the file counts: {self.read} of {self.said}"
-            )
-        if self.orphans:
-            losses.append(f"{counted(self.orphans)} dropped: no record before says what it is")
+            losses.append(f"{self.read} of the {self.said} messages that the file counts were read")
         return losses
 
     def _cut(self, file: BinaryIO, stopped: int) -> str:
@@ -355,15 +338,14 @@ def _is_split(files: list[Path]) -> bool:
     numbered = [_numbered(file) for file in files]
     if len(files) < 2 or numbered != [(numbered[0][0], k) for k in range(len(files))]:
         return False
-    spans = [_span(file, file.stat().st_mtime_ns) for file in files]
+    spans = [_span(file) for file in files]
     return all(
         not (before and after) or abs(after[0] - before[1]) < GAP * 1e9
         for before, after in zip(spans, spans[1:], strict=False)
     )
 
 
-@lru_cache(maxsize=64)
-def _span(part: Path, _written: int) -> tuple[int, int] | None:
+def _span(part: Path) -> tuple[int, int] | None:
     """Log times of the first and of the last message [ns]; None where the file's end says none."""
     with suppress(*DAMAGE, OSError), part.open("rb") as file:
         summary = make_reader(file).get_summary()

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording.camera import Camera
 from sling2sim2real.recording.streams import Recording
-from sling2sim2real.recording.transforms import Transform, TransformTree
+from sling2sim2real.recording.transforms import Transform, TransformTree, is_tool
 from sling2sim2real.settings.lab import SetupParams
 
 # Standard deviations of what a lab measures.
@@ -77,24 +77,7 @@ class Loop:
         )
 
 
-def third(
-    base: Transform | None, camera: Transform | None, between: Transform | None
-) -> tuple[Transform | None, Transform | None]:
-    """Base to fork's frame O and camera to it, with the one that is None by way of the others.
-
-    Args:
-        base, camera: Coordinates there to frame O.
-        between: Camera to base.
-    """
-    if base is None and camera is not None and between is not None:
-        return camera @ between.inverse(), camera
-    if camera is None and base is not None and between is not None:
-        return base, base @ between
-    return base, camera
-
-
 FORK = "fork"
-TOOLS = ("tcp", "ee", "end_effector")  # words in the name of the frame that a pose is given for
 
 
 @dataclass(frozen=True)
@@ -166,7 +149,7 @@ class EpisodeGeometry:
         return cls(
             content["base_frame"],
             Transform.of(content["base_to_fork"]),
-            Camera(**{**camera, **arrays}),
+            Camera(camera["width"], camera["height"], **arrays, frame=camera["frame"]),
             Transform.of(content["camera_to_fork"]),
         )
 
@@ -196,7 +179,10 @@ def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
     )
     named = pose_frame and color_frame
     between = tree.between(pose_frame, color_frame) if named else None
-    base, color_to_fork = third(*transforms, between)
+    base, color_to_fork = transforms
+    if between is not None:
+        base = base or (color_to_fork and color_to_fork @ between.inverse())
+        color_to_fork = color_to_fork or (base and base @ between)
     if base is None:
         raise _missing(recording, "base_to_fork", pose_frame, color_frame)
     if color_to_fork is None:
@@ -258,7 +244,7 @@ def _tool_frame(tree: TransformTree, wrench_frame: str, tip_link: str | None) ->
     rigid = [frame for frame in tree.frames if tree.between(frame, wrench_frame) is not None]
     if tip_link in rigid:
         return tip_link
-    named = [frame for frame in rigid if set(frame.lower().split("_")) & set(TOOLS)]
+    named = [frame for frame in rigid if is_tool(frame)]
     roots = [frame for frame in rigid if tree.is_root(frame)]
     return (named or roots or [wrench_frame])[0]
 

@@ -15,7 +15,8 @@ from sling2sim2real.recording.scene import Scene
 from sling2sim2real.recording.signals import Signals
 from sling2sim2real.settings.lab import BandParams
 
-HAND_ERROR, GRIP_ERROR = 0.005, 0.005  # m: of the tool centre point; of the grip along the band
+HAND_ERROR = 0.005  # m: of the tool centre point, and of the grip along the band
+ASIDE = 2.0  # times as much an error turns the resultant in the strands' plane as out of it
 FRAME_ERROR = np.deg2rad(0.5)  # of a sensor that is mounted and calibrated well
 WEIGHT_ERROR = 0.3  # of half the weight, by sag and a band that is not alike all along
 CREEP = 0.002  # of the held force, that a zero may be off meanwhile
@@ -59,68 +60,51 @@ def hold_of(signals: Signals, scene: Scene, band: BandParams, weighed: bool = Tr
     hand = signals.hand(signals.release_time - 0.01)
     force = np.array(facts.hold_force) - half
     size = float(np.linalg.norm(force))
-    up, along, across = _axes(scene, hand)
-    angles = np.array([np.arcsin(np.clip(force @ way / size, -1, 1)) for way in (up, across)])
-    # By how much the axes turn where the hand or the grip is elsewhere.
-    spread = np.zeros(2)
-    for axis in np.eye(3) * HAND_ERROR:
-        moved = _axes(scene, hand + axis)[1]
-        spread += np.array([moved @ up, moved @ across]) ** 2
-    spread += np.array([0.0, _axes(scene, hand, GRIP_ERROR)[1] @ across]) ** 2
-    zero = np.hypot(facts.zero_error, _unsure(facts.zero_change, facts.zero_steady))
-    spread += FRAME_ERROR**2 + (zero / size) ** 2
-    spread += np.array([WEIGHT_ERROR * float(np.linalg.norm(half)) / size, 0.0]) ** 2
-    mass = band.mass if weighed else None
-    weight, weight_error = _weight(signals, scene, mass, float(np.hypot(zero, CREEP * size)))
+    pull = _pull(scene, hand)
+    along = pull / np.linalg.norm(pull)
+    up = np.cross(*(scene.tips[::-1] - hand))
+    up = up / np.linalg.norm(up) * (1.0 if up[2] >= 0 else -1.0)
+    across = np.cross(along, up)
+    unsteady = not facts.zero_steady and facts.zero_change  # while held it is somewhere up to that
+    zero = float(np.hypot(facts.zero_error, np.linalg.norm(unsteady or 0.0)))
+    place = HAND_ERROR / float(np.linalg.norm(hand)) * np.array([1.0, ASIDE])
+    sag = WEIGHT_ERROR * float(np.linalg.norm(half)) / size * np.array([1.0, 0.0])
+    weight, weight_error = None, np.inf
+    if weighed:
+        weight, weight_error = _weight(signals, scene, band.mass, np.hypot(zero, CREEP * size))
     area = np.pi * band.diameter**2 / 4
     return Hold(
         size=size,
         lift=float(force @ up),
         aside=float(force @ across),
-        angles=angles,
-        errors=np.sqrt(spread),
-        modulus=float(force @ along / (area * np.linalg.norm(_pull(scene, hand)))),
+        angles=np.arcsin(np.clip([force @ up / size, force @ across / size], -1, 1)),
+        errors=np.sqrt(place**2 + sag**2 + FRAME_ERROR**2 + (zero / size) ** 2),
+        modulus=float(force @ along / (area * np.linalg.norm(pull))),
         weight=weight,
         weight_error=weight_error,
     )
 
 
-def _axes(
-    scene: Scene, hand: np.ndarray, grip: float = 0.0
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Normal of the strands' plane (up), their resultant, and across it in the plane (right)."""
-    along = _pull(scene, hand, grip)
-    along = along / np.linalg.norm(along)
-    up = np.cross(*(scene.tips[::-1] - hand))
-    up = up / np.linalg.norm(up) * (1.0 if up[2] >= 0 else -1.0)
-    return up, along, np.cross(along, up)
-
-
-def _pull(scene: Scene, hand: np.ndarray, grip: float = 0.0) -> np.ndarray:
+def _pull(scene: Scene, hand: np.ndarray) -> np.ndarray:
     """Pull of both strands on the hand, for a modulus and an area of 1, shape (3,)."""
     ways = scene.tips - hand
     lengths = np.linalg.norm(ways, axis=1)
-    stretch = lengths / (scene.rest_length / 2 + np.array([grip, -grip]))
+    stretch = lengths / (scene.rest_length / 2)
     stress = (stretch - stretch**-2.0).clip(0.01) / 3  # neo-Hookean, over Young's modulus
     return (stress / lengths) @ ways
 
 
-def _weight(
-    signals: Signals, scene: Scene, mass: float | None, zero: float
-) -> tuple[float | None, float]:
-    """How heavy the slack band is on the hand, over its whole weight, and the error of that."""
+def _weight(signals: Signals, scene: Scene, mass: float, zero: float) -> tuple[float | None, float]:
+    """How heavy the slack band is on the hand, over its whole weight, and the error of that.
+
+    Args:
+        zero: Standard deviation of the force's zero [N].
+    """
     times = signals.time
-    way = np.array([scene.stretch(time) for time in times])
     slack = (times > signals.grasp_time + AFTER_GRASP) & (times < signals.release_time)
-    slack &= way < SLACK
-    if slack.sum() < LEAST_SLACK or mass is None:
+    slack &= np.array([scene.stretch(time) for time in times]) < SLACK
+    if slack.sum() < LEAST_SLACK:
         return None, np.inf
-    heavy = mass * float(np.linalg.norm(GRAVITY))
-    force = signals.force[slack, 2]
+    heavy, force = mass * float(np.linalg.norm(GRAVITY)), signals.force[slack, 2]
     error = np.hypot(zero, force.std() / np.sqrt(LEAST_SLACK))
     return float(-force.mean() / heavy), float(error / heavy)
-
-
-def _unsure(change: list[float] | None, steady: bool) -> float:
-    """How far the zero while held may be from that before [N]: it is somewhere up to the change."""
-    return 0.0 if steady or change is None else float(np.linalg.norm(change))

@@ -24,10 +24,6 @@ class Undecodable(Exception):
     """An image that cannot be decoded; the message says why."""
 
 
-class Unsupported(Undecodable):
-    """An image of a kind that is not known, so all of its topic are undecodable."""
-
-
 @contextmanager
 def opened(data: np.ndarray) -> Iterator[Image.Image]:
     """A packed picture, whose header is read. Raises Undecodable, also of what is done with it."""
@@ -67,24 +63,18 @@ COLORS = {
     "rgba8": (4, cv2.COLOR_RGBA2BGR),
     "bgra8": (4, cv2.COLOR_BGRA2BGR),
     "mono8": (1, cv2.COLOR_GRAY2BGR),
-    "8UC1": (1, cv2.COLOR_GRAY2BGR),
-    "mono16": (1, cv2.COLOR_GRAY2BGR),
     "bgr8": (3, None),
-    "8UC3": (3, None),
 }
-MILLIMETRES = {"16UC1": np.uint16, "mono16": np.uint16, "16SC1": np.int16}
-METRES = {"32FC1": np.float32, "64FC1": np.float64}
-DEPTHS = MILLIMETRES | METRES
-NAMED = tuple(kind for kind in DEPTHS if kind != "mono16")  # which may be infrared
+DEPTHS = {"16UC1": np.uint16, "32FC1": np.float32}  # millimetres, metres
 FARTHEST = 1e6  # m or mm: floats beyond it are no depth
 USE = "use 16UC1 (in millimetres) or 32FC1 (in metres)"
 
 
 def is_depth(picture: Picture) -> bool:
     """Whether a picture says that it holds depth; a grey PNG of 16 bits is taken to."""
-    if picture.encoding or "compressedDepth" in picture.format:
-        return picture.encoding in NAMED or "compressedDepth" in picture.format
-    if picture.format.startswith(NAMED):
+    if picture.encoding:
+        return picture.encoding in DEPTHS
+    if "compressedDepth" in picture.format or picture.format.startswith(tuple(DEPTHS)):
         return True
     try:
         with opened(picture.data) as image:
@@ -97,18 +87,16 @@ def color(picture: Picture) -> np.ndarray:
     """Decode a picture to BGR, shape (H, W, 3), uint8. Raises Undecodable."""
     if picture.format:
         if "compressedDepth" in picture.format:
-            raise Unsupported(f"format {picture.format!r} is depth, not colour")
+            raise Undecodable(f"format {picture.format!r} is depth, not colour")
         pixels = unpacked(picture.data, picture.format)
         if pixels.ndim == 3:
             return cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR)
         grey = pixels if pixels.dtype == np.uint8 else (pixels >> 8).astype(np.uint8)
         return cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
     if picture.encoding not in COLORS:
-        raise Unsupported(f"colour encoding {picture.encoding!r} is not known, use rgb8 or bgr8")
+        raise Undecodable(f"colour encoding {picture.encoding!r} is not known, use rgb8 or bgr8")
     channels, conversion = COLORS[picture.encoding]
-    pixels = _rows(picture, np.uint16 if picture.encoding == "mono16" else np.uint8, channels)
-    if picture.encoding == "mono16":
-        pixels = (pixels >> 8).astype(np.uint8)
+    pixels = _rows(picture, np.uint8, channels)
     return np.ascontiguousarray(pixels) if conversion is None else cv2.cvtColor(pixels, conversion)
 
 
@@ -116,24 +104,23 @@ def depth(picture: Picture) -> np.ndarray:
     """Decode a picture to metres, shape (H, W), float32, 0 where unknown. Raises Undecodable."""
     if not picture.format:
         if picture.encoding not in DEPTHS:
-            raise Unsupported(f"depth encoding {picture.encoding!r} is not known, {USE}")
+            raise Undecodable(f"depth encoding {picture.encoding!r} is not known, {USE}")
         return _metres(_rows(picture, DEPTHS[picture.encoding], 1))
     floats = picture.format.startswith("32FC1")
     if "compressedDepth" not in picture.format:
-        pixels = unpacked(picture.data, picture.format)
-        if floats and pixels.dtype != np.float32:
-            raise Unsupported(f"depth format {picture.format!r} is not known, use compressedDepth")
-        return _metres(pixels)
+        if floats:
+            raise Undecodable(f"depth format {picture.format!r} is not known, use compressedDepth")
+        return _metres(unpacked(picture.data, picture.format))
     body = _body(picture.data)
     if len(body) == len(picture.data) and floats:
-        raise Unsupported(
+        raise Undecodable(
             f"depth format {picture.format!r} without the header of {DEPTH_HEADER.size} bytes that"
             " says how it is quantised: record the raw depth, or as 16UC1"
         )
     if not len(body):
         raise Undecodable("compressedDepth without a picture")
     if "rvl" in picture.format.lower():
-        raise Unsupported("compressedDepth in RVL is not read: record it in PNG")
+        raise Undecodable("compressedDepth in RVL is not read: record it in PNG")
     packed = unpacked(body, picture.format)
     if not floats:
         return _metres(packed)
@@ -198,10 +185,9 @@ def _rows(picture: Picture, kind: type, channels: int) -> np.ndarray:
 def _metres(depth: np.ndarray) -> np.ndarray:
     """Integers of 16 bits hold millimetres, floats hold metres."""
     if depth.ndim != 2:
-        raise Unsupported("a picture in colour is no depth image")
-    if depth.dtype in MILLIMETRES.values():
-        return np.maximum(depth, 0).astype(np.float32) / 1000
-    if depth.dtype not in METRES.values():
-        raise Unsupported(f"depth image of {depth.dtype}, {USE}")
-    measured = np.isfinite(depth) & (depth > 0) & (depth < FARTHEST)
-    return np.where(measured, depth, 0).astype(np.float32)
+        raise Undecodable("a picture in colour is no depth image")
+    if depth.dtype == np.uint16:
+        return depth.astype(np.float32) / 1000
+    if depth.dtype != np.float32:
+        raise Undecodable(f"depth image of {depth.dtype}, {USE}")
+    return np.where(np.isfinite(depth) & (depth > 0) & (depth < FARTHEST), depth, np.float32(0))

@@ -6,7 +6,7 @@ and viewers that URDF packages come with. Conventions: wiki.ros.org/urdf/XML/joi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -14,9 +14,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording.transforms import is_tool
 
 FOLDER = Path("robots")
-TIPS = ("tcp", "ee", "hand_tcp")  # last words of a link that is taken as the tip
 TURNING, SLIDING = ("revolute", "continuous"), ("prismatic",)
 LEAST_AXIS = 1e-9
 
@@ -26,15 +26,12 @@ class Joint:
     """One joint of a URDF; its child's frame moves from `origin` about or along `axis`."""
 
     name: str
-    kind: str
+    kind: str  # as the URDF says; "mimic" of one that follows another, which no arm has
     parent: str
     child: str
     rotation: Rotation
     translation: np.ndarray  # (3,) m
     axis: np.ndarray  # (3,), unit
-    source: str  # the joint whose position counts: itself, or the one that it mimics
-    multiplier: float
-    offset: float
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,7 @@ class Chain:
             place = place + turn.apply(joint.translation)
             turn = turn * joint.rotation
             if joint.kind in TURNING + SLIDING:
-                motion = joint.multiplier * column[joint.source] + joint.offset
+                motion = column[joint.name]
                 if joint.kind in TURNING:
                     turn = turn * Rotation.from_rotvec(motion[:, None] * joint.axis)
                 else:
@@ -79,7 +76,7 @@ def chain_of(file: str, tip: str | None = None) -> Chain:
 
     Args:
         file: params.setup.urdf.
-        tip: params.setup.tip_link; None takes the one link named tcp, ee or hand_tcp.
+        tip: params.setup.tip_link; None takes the one link named like a tool.
 
     Raises:
         UserError: in one line, where it cannot be read or has no such link.
@@ -91,7 +88,6 @@ def chain_of(file: str, tip: str | None = None) -> Chain:
     tip = tip or _tip(path, links, parents)
     if tip not in links:
         raise UserError(f"setup.tip_link: {path} has no link {tip!r}, it has {', '.join(links)}")
-    by_name = {joint.name: joint for joint in joints}
     chain: list[Joint] = []
     link = tip
     while link in parents:
@@ -100,12 +96,12 @@ def chain_of(file: str, tip: str | None = None) -> Chain:
             raise UserError(f"{path}: the joints above {tip} go round in a loop")
         if joint.kind not in (*TURNING, *SLIDING, "fixed"):
             raise UserError(f"{path}: joint {joint.name} is {joint.kind}, which is not supported")
-        chain.insert(0, _resolved(path, joint, by_name))
+        chain.insert(0, joint)
         link = joint.parent
-    moving = [joint.source for joint in chain if joint.kind != "fixed"]
+    moving = tuple(joint.name for joint in chain if joint.kind != "fixed")
     if not moving:
         raise UserError(f"{path}: no joint moves {tip}, set setup.tip_link to the hand")
-    return Chain(link, tip, tuple(chain), tuple(dict.fromkeys(moving)))
+    return Chain(link, tip, tuple(chain), moving)
 
 
 def _joints(path: Path) -> list[Joint]:
@@ -128,8 +124,7 @@ def _joints(path: Path) -> list[Joint]:
 
 def _joint(element: ElementTree.Element) -> Joint:
     name = element.attrib["name"]
-    origin, mimic = element.find("origin"), element.find("mimic")
-    parent, child = element.find("parent"), element.find("child")
+    origin, parent, child = map(element.find, ("origin", "parent", "child"))
     if parent is None or child is None:
         raise ValueError(f"{name}: without a child or parent")
     axis = _numbers(element.find("axis"), "xyz", "1 0 0")
@@ -138,15 +133,12 @@ def _joint(element: ElementTree.Element) -> Joint:
         raise ValueError(f"{name}: axis without length")
     return Joint(
         name,
-        element.attrib["type"],
+        "mimic" if element.find("mimic") is not None else element.attrib["type"],
         parent.attrib["link"],
         child.attrib["link"],
         Rotation.from_euler("xyz", _numbers(origin, "rpy", "0 0 0")),  # about fixed axes
         _numbers(origin, "xyz", "0 0 0"),
         axis / length,
-        name if mimic is None else mimic.attrib["joint"],
-        1.0 if mimic is None else float(mimic.get("multiplier", 1)),
-        0.0 if mimic is None else float(mimic.get("offset", 0)),
     )
 
 
@@ -158,23 +150,8 @@ def _numbers(element: ElementTree.Element | None, key: str, default: str) -> np.
     return numbers
 
 
-def _resolved(path: Path, joint: Joint, by_name: dict[str, Joint]) -> Joint:
-    """Joint whose source is the one really measured, also where a mimic mimics a mimic."""
-    source, multiplier, offset = joint.source, joint.multiplier, joint.offset
-    for _ in by_name:
-        other = by_name.get(source)
-        if other is None:
-            raise UserError(f"{path}: joint {joint.name} mimics {source}, which is not there")
-        if other.source == other.name:
-            break
-        offset += multiplier * other.offset
-        multiplier *= other.multiplier
-        source = other.source
-    return replace(joint, source=source, multiplier=multiplier, offset=offset)
-
-
 def _tip(path: Path, links: list[str], parents: dict[str, Joint]) -> str:
-    named = [link for link in links if any(("_" + link.lower()).endswith("_" + t) for t in TIPS)]
+    named = [link for link in links if is_tool(link)]
     if len(named) != 1:
         ends = {joint.parent for joint in parents.values()}
         tips = named or [link for link in links if link not in ends]

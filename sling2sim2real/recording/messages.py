@@ -16,7 +16,7 @@ import base64
 import json
 import os
 import re
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from tempfile import TemporaryFile
@@ -27,7 +27,7 @@ import numpy as np
 import zstandard
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
-from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 from scipy.spatial.transform import Rotation
 
@@ -142,29 +142,28 @@ def decoder(schema: Schema, encoding: str) -> Decoder:
     Raises:
         ValueError: where the encoding is not known or the schema is bad, in one line.
     """
-    by_name = encoding == "cdr" and _says_nothing(schema)
-    if not by_name and (schema.encoding, encoding) not in DECODERS:
+    make = DECODERS.get((schema.encoding, encoding))
+    if encoding == "cdr" and _says_nothing(schema):
+        make = _by_name
+    if make is None:
         supported = ", ".join(f"{a} with {b}" for a, b in DECODERS)
         what = f"schema {schema.encoding!r}" if schema.encoding else "no schema"
         raise ValueError(
             f"{what} with messages {encoding!r} cannot be read, record one of: {supported}"
         )
     try:
-        if by_name:
-            read = partial(_store().deserialize_cdr, typename=_standard_name(schema.name))
-        else:
-            read = _compiled(schema.encoding, encoding, schema.name, schema.data)
+        read = make(schema)
     except Exception as error:  # the parsers raise many kinds
         raise ValueError(f"bad schema {schema.name} ({Unreadable.by(error)})") from error
     return (lambda payload: read(_plain(payload))) if encoding == "cdr" else read
 
 
 def _says_nothing(schema: Schema) -> bool:
-    """Whether a schema is no more than the name of a standard type of ROS 2."""
+    """Whether a standard type of ROS 2 is read by its name: its schema says no more, or in IDL."""
     name = _standard_name(schema.name)
     if not name.startswith(PACKAGES) or name not in _store().fielddefs:
         return False
-    if schema.encoding in ("", "omgidl"):  # of DDS, whose names of ROS types are as well known
+    if schema.encoding in ("", "omgidl", "ros2idl"):  # IDL, whose names of ROS types are well known
         return True
     return schema.encoding == "ros2msg" and schema.data.strip() in (b"", schema.name.encode())
 
@@ -192,24 +191,16 @@ def _store() -> Typestore:
     return get_typestore(Stores.ROS2_HUMBLE)
 
 
-@lru_cache(64)
-def _compiled(kind: str, encoding: str, name: str, data: bytes) -> Decoder:
-    return DECODERS[kind, encoding](Schema(id=1, name=name, encoding=kind, data=data))
+def _by_name(schema: Schema) -> Decoder:
+    return partial(_store().deserialize_cdr, typename=_standard_name(schema.name))
 
 
 def _ros(schema: Schema) -> Decoder:
     """Decoder by types of this schema alone, because recordings may mix versions of a type."""
     text = schema.data.decode()
-    # As rosbags has it: with the `msg` that ROS 1 leaves out.
-    name = re.sub("^([^/:]+)(/|::)([^/:]+)$", r"\1/msg/\3", schema.name).replace("::", "/")
+    name = _standard_name(schema.name)
     store = get_typestore(Stores.EMPTY)
-    if schema.encoding == "ros2idl":  # one file a type: mcap.dev/spec/registry#ros2idl
-        text = re.sub("^#.*$", "", text, flags=re.MULTILINE)  # rosbags does not know #include
-        files = re.split(r"^=+\nIDL: .*\n", text, flags=re.MULTILINE)
-        types = [get_types_from_idl(file) for file in files if file.strip()]
-        store.register({key: value for some in types for key, value in some.items()})
-    else:
-        store.register(get_types_from_msg(text, name))
+    store.register(get_types_from_msg(text, name))
     store.get_msgdef(name)
     ros1 = schema.encoding == "ros1msg"
     read = store.deserialize_ros1 if ros1 else store.deserialize_cdr
@@ -230,7 +221,6 @@ def _json(schema: Schema) -> Decoder:
 
 DECODERS: dict[tuple[str, str], Callable[[Schema], Decoder]] = {
     ("ros2msg", "cdr"): _ros,
-    ("ros2idl", "cdr"): _ros,
     ("ros1msg", "ros1"): _ros,
     ("protobuf", "protobuf"): _protobuf,
     ("jsonschema", "json"): _json,
@@ -263,11 +253,6 @@ class Picture:
     def data(self) -> np.ndarray:
         """The bytes, uint8."""
         return self.content() if callable(self.content) else self.content
-
-    @property
-    def kind(self) -> tuple[Hashable, ...]:
-        """What all pictures of a topic have in common."""
-        return self.encoding, self.format, self.height, self.width, self.step
 
 
 class Reading(NamedTuple):

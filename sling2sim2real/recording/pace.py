@@ -1,9 +1,7 @@
 """How a topic's messages follow on one another: stamps that come in bursts, values that repeat.
 
 A driver that empties a buffer stamps all that is in it at once: an FTDI chip hands over what came
-within 16 ms. The samples were taken at an even rate before that, and are put back there. A clock
-that ticks coarsely gives samples the stamp of the tick before them, though they are received one
-by one: these are put evenly behind it.
+within 16 ms. The samples were taken at an even rate before that, and are put back there.
 
 A publisher that is faster than its source sends each value again until there is a new one. Between
 two values the truth moves on: a value held is late by half of the hold, on average. Only the first
@@ -15,6 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
+from sling2sim2real.base.errors import UserError
 
 CLOSE = 0.25  # of the mean way between messages: what is nearer is of one burst
 MOST_CLOSE = 0.4  # share of such ways from which they are no accident
@@ -37,24 +37,25 @@ class Bursts:
     Attributes:
         count: Messages in one, in the median.
         interval: Between two of them [ns].
-        before: Samples were taken before their stamps; behind them otherwise.
         error: Standard deviation of the even stamps [ns].
     """
 
     count: int
     interval: float
-    before: bool
     error: float
 
 
 def without_bursts(
-    stamp: np.ndarray, log: np.ndarray, values: np.ndarray
+    topic: str, stamp: np.ndarray, log: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, Bursts] | None:
     """Stamps at an even rate within each burst, and what the bursts were; None of even ones.
 
     Args:
         stamp, log: In the order of arrival [ns], shape (S,).
         values: Shape (S, C).
+
+    Raises:
+        UserError: Those of one stamp are received one by one: the topic's clock ticks coarsely.
     """
     ways = np.diff(stamp)
     if len(stamp) < 20:
@@ -71,21 +72,21 @@ def without_bursts(
         return None
     counts = last - first + 1
     count = int(np.median(counts))
-    before = np.median((log[last] - log[first])[counts == count]) < CLOSE * mean * (count - 1)
-    tick = stamp[last] if before else stamp[first]
-    between = np.diff(tick).astype(float)
+    if np.median((log[last] - log[first])[counts == count]) >= CLOSE * mean * (count - 1):
+        raise UserError(
+            f"{topic}: its clock ticks every {np.median(np.diff(stamp[last])) * 1e-6:.3g} ms only:"
+            " stamp each message when it is measured (of a simulator, publish its clock more often)"
+        )
+    between = np.diff(stamp[last]).astype(float)
     interval = float(np.median(between))
-    usual = float(np.median(between / (counts[1:] if before else counts[:-1])))  # between samples
-    # Whose interval is known: that before a burst's end, or that behind a tick.
-    spans = np.append(0.0, between) if before else np.append(between, 0.0)
-    sound = (spans > 0) & (spans < LONGEST * counts * usual)
-    spans = np.where(sound, spans, counts * usual)
+    usual = float(np.median(between / counts[1:]))  # between samples
+    spans = np.append(0.0, between)  # those before a burst's end
+    spans = np.where((spans > 0) & (spans < LONGEST * counts * usual), spans, counts * usual)
     burst = np.repeat(np.arange(len(first)), counts)
-    place = np.arange(len(stamp)) - first[burst]
-    share = (place + 1) / counts[burst] - 1 if before else (place + 0.5) / counts[burst]
-    even = tick[burst] + np.round(share * spans[burst]).astype(np.int64)
+    share = (np.arange(len(stamp)) - first[burst] + 1) / counts[burst] - 1
+    even = stamp[last][burst] + np.round(share * spans[burst]).astype(np.int64)
     jitter = float(np.std(between[np.abs(between - interval) < interval / 2]))
-    return even, Bursts(count, interval, bool(before), max(jitter, usual / np.sqrt(12)))
+    return even, Bursts(count, interval, max(jitter, usual / np.sqrt(12)))
 
 
 def hold_of(stamp: np.ndarray, values: np.ndarray) -> float | None:

@@ -36,7 +36,7 @@ from sling2sim2real.recording.topics import (
     transforms_of,
 )
 from sling2sim2real.recording.transforms import TransformTree
-from sling2sim2real.recording.words import counted, few, shortened
+from sling2sim2real.recording.words import shortened
 from sling2sim2real.settings.lab import SetupParams
 from sling2sim2real.settings.recording import DelayParams
 
@@ -47,9 +47,7 @@ ABSURD = 1e6  # N, m, m/s, rad: nothing here is as large
 LONE = {"wrench": 30.0, "pose": 0.05}  # N, m
 MOST_LONE = 0.05  # share of the messages that may be alone: more are the sensor's noise, or units
 FASTEST = 2.0  # m/s of the hand
-LONG_GAP, LONG_GAP_S = 5.0, 0.02  # periods and seconds from which a gap is named
-ENDS = 0.3  # s by which a topic may start later or stop earlier than the others
-SHOWN = 3  # places named in one line, losses in an error
+SHOWN = 3  # losses named in an error
 REASON, LOSS, LINE = 100, 300, 1000  # characters: why a message is damaged, a loss, an error
 # Clocks
 FAR = 1.0  # s from a stamp to those around it: it is damage
@@ -289,10 +287,6 @@ def streams_of(
     for role in set(streams) - {"wrench", *OPTIONAL}:
         clock = course_of(streams[role].stamp, made[role][1], wrench.stamp, wrench_log)
         streams[role] = replace(streams[role], clock=clock)
-    first = min(stream.stamp[0] for stream in streams.values())
-    last = max(stream.stamp[-1] for stream in streams.values())
-    for stream in streams.values():
-        stream.notes.extend(_gaps(stream, int(wrench.stamp[0]), int(first), int(last)))
     return streams, remarks
 
 
@@ -355,22 +349,12 @@ def _read(role: str, choice: Choice) -> tuple[_Raw, str]:
 
 def _stream_of(role: str, choice: Choice, late: float) -> tuple[Stream[Any], np.ndarray]:
     """One topic, sorted, and its times of receipt [ns]. Raises UserError where it is of no use."""
-    (raw, frame), notes, hold = _read(role, choice), [], None
+    (raw, frame), even, hold = _read(role, choice), None, None
     _expect_forward(raw)
     raw.drop(_outliers(raw.stamp), "far off in time")
-    disorder = int(np.count_nonzero(np.diff(raw.stamp) < 0))
-    numbers = role not in CAMERAS
-    even = pace.without_bursts(raw.stamp, raw.log, raw.values) if numbers else None
-    if even is not None:
-        raw.stamp, bursts = even
-        every, side = 1e-6 * bursts.interval, "before" if bursts.before else "after"
-        notes.append(
-            f"stamped in bursts of {bursts.count} every {every:.3g} ms: spread evenly over the time"
-            f" {side} each"
-        )
-    elif disorder:
-        notes.append(f"{counted(disorder)} out of order, sorted by stamp")
-    raw.stamp = raw.stamp - round(late * 1e9)
+    if role not in CAMERAS:
+        even = pace.without_bursts(raw.topic, raw.stamp, raw.log, raw.values)
+    raw.stamp = (even[0] if even else raw.stamp) - round(late * 1e9)
     raw.keep(np.argsort(raw.stamp, kind="stable"))
     raw.drop(np.diff(raw.stamp, prepend=raw.stamp[0] - 1) == 0, "with the stamp of another")
     if role in LONE and choice.convert is None:
@@ -378,12 +362,7 @@ def _stream_of(role: str, choice: Choice, late: float) -> tuple[Stream[Any], np.
     if choice.convert is not None:
         raw.values = choice.convert(raw.values)
     if role in LONE and (hold := pace.hold_of(raw.stamp, raw.values)):
-        retained = pace.first_of_each(raw.stamp, raw.values, hold)
-        times = f"{len(retained) / np.count_nonzero(retained):.0f}"
-        notes.append(f"each value is sent {times} times: the repeats are left out")
-        raw.keep(retained)
-    if raw.lost:
-        notes.append(f"lost {raw.words()}")
+        raw.keep(pace.first_of_each(raw.stamp, raw.values, hold))
     stream = Stream(
         topic=raw.topic,
         frame=frame,
@@ -391,7 +370,7 @@ def _stream_of(role: str, choice: Choice, late: float) -> tuple[Stream[Any], np.
         values=raw.values,
         receipt_delay=float(np.median(raw.log - raw.stamp) * 1e-9),
         lost=sum(raw.lost.values()),
-        notes=notes,
+        notes=[f"lost {raw.words()}"] if raw.lost else [],
         bursts=even and even[1],
         hold=1e-9 * (hold or 0.0),
     )
@@ -435,23 +414,6 @@ def _lone(raw: _Raw, role: str) -> np.ndarray:
     around = median_filter(values, (5, 1), mode="nearest")
     lone = np.abs(values - around).max(axis=1) > limit
     return lone if lone.mean() <= MOST_LONE else np.zeros(len(lone), bool)
-
-
-def _gaps(stream: Stream[Any], origin: int, first: int, last: int) -> list[str]:
-    """Long gaps, and ends that lack what the other topics have."""
-    notes, ways = [], np.diff(stream.stamp) * 1e-9
-    late, early = (stream.stamp[0] - first) * 1e-9, (last - stream.stamp[-1]) * 1e-9
-    least = max(ENDS, LONG_GAP * stream.period)
-    if late > least:
-        notes.append(f"starts {late:.2f} s after the others")
-    if early > least:
-        notes.append(f"stops {early:.2f} s before the others")
-    long = np.flatnonzero(ways > max(LONG_GAP * stream.period, LONG_GAP_S))
-    if len(long):
-        at = stream.seconds(origin)
-        named = [f"{ways[i]:.3f} s at {at[i]:.2f} s" for i in long[np.argsort(-ways[long])]]
-        notes.append(f"gap{'s' * (len(long) > 1)} of {few(named, SHOWN)}")
-    return notes
 
 
 def _expect_one_clock(

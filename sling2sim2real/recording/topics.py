@@ -10,8 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from os.path import commonprefix
+from functools import partial
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from sling2sim2real.recording.camera import Camera, camera_from
 from sling2sim2real.recording.files import Container
 from sling2sim2real.recording.kinematics import chain_of
 from sling2sim2real.recording.messages import TYPES, Edge, Reading, Topic, Unreadable
-from sling2sim2real.recording.transforms import Transform, TransformTree
+from sling2sim2real.recording.transforms import Transform, TransformTree, is_tool
 from sling2sim2real.recording.words import few
 from sling2sim2real.settings.lab import SetupParams
 
@@ -35,8 +34,6 @@ OPTIONAL = ("gripper",)
 COMMANDS = ("goal", "desired", "command", "commanded", "cmd", "target", "reference", "setpoint")
 THINGS = ("camera", "object", "tag", "marker")
 COLOUR = {"color": "colour", "depth": "depth"}
-VIDEO = ("FFMPEGPacket", "CompressedVideo")
-TOOLS = {"tcp", "ee", "end_effector"}  # words in the name of the frame that a pose is given for
 STILL = 1e-9  # m and quaternion: a transform that changes by more is no static one
 
 Convert = Callable[[np.ndarray], np.ndarray]
@@ -69,15 +66,14 @@ class Choice:
         """Those of its messages that can be read."""
         return [reading for _, reading in self.messages if isinstance(reading, Reading)]
 
-    @cached_property
+    @property
     def typical(self) -> Reading:
-        """The first message of the frame and kind that most have. Raises UserError."""
-        some = self.readings[:TRIES]
-        if not some:
+        """The one in the middle, for what all have in common. Raises UserError if there is none."""
+        readings = self.readings
+        if not readings:
             reason = next((why for _, why in self.messages[::-1]), "all are damaged")
             raise UserError(f"{self.name} has fewer than two readable messages ({reason})")
-        kinds = [(reading.frame, getattr(reading.value, "kind", None)) for reading in some]
-        return some[kinds.index(Counter(kinds).most_common(1)[0][0])]
+        return readings[len(readings) // 2]
 
 
 @dataclass(frozen=True)
@@ -155,21 +151,17 @@ def _rate(topic: Topic) -> float:
     return (len(topic.log_times) - 1) / span if span > 0 else 0.0
 
 
-def _hints(role: Role, name: str) -> list[str]:
-    """The role's hints in a topic's name: whole words, or long ones within words."""
-    return [h for h in role.hints if h in _words(name) or (len(h) > 3 and h in name.lower())]
-
-
 def _standing(role: Role, topic: Topic) -> tuple:
-    """What decides: measured, not spare, no doubts, a likely rate, type, whether hints."""
-    doubts = _words(topic.name) & {*role.doubts}
+    """What decides: measured, not spare, no doubts, a likely rate, type, a hint in the name."""
+    words = _words(topic.name)
+    doubts = words & {*role.doubts}
     return (
         not doubts & {*COMMANDS},
         topic.kind not in role.spare,
         -len(doubts),
         _rate(topic) >= role.rate,
         -role.types.index(topic.kind),
-        bool(_hints(role, topic.name)),
+        any(h in words or (len(h) > 3 and h in topic.name.lower()) for h in role.hints),
     )
 
 
@@ -218,18 +210,16 @@ class _Chooser:
         self.ambiguous: list[str] = []  # settings of roles that several topics could play
 
     def choice(self, role: str, chosen: dict[str, Choice]) -> Choice | None:
-        self.problems = []
-        name = getattr(self.setup.topics, role)
+        self.problems, name = [], getattr(self.setup.topics, role)
         if name is not None:
             return self._named(role, name)
-        fitting = [self._read(role, topic) for topic in self.topics]
-        fitting = [choice for choice in fitting if choice and self._suits(role, choice)]
+        fitting = [choice for topic in self.topics if (choice := self._read(role, topic))]
         if role.endswith("_info"):
             return self._info(fitting, role.removesuffix("_info"), chosen)
+        if role == "depth" and (frame := chosen["color"].typical.frame):  # registered to colour
+            fitting = [choice for choice in fitting if choice.typical.frame == frame] or fitting
         if not fitting:
             return None
-        if role == "depth":
-            fitting = _nearest(fitting, chosen["color"])
         best = max(fitting, key=lambda c: (_standing(ROLES[role], c.topic), len(c.messages)))
         standing = _standing(ROLES[role], best.topic)
         alike = {_source(c.name) for c in fitting if _standing(ROLES[role], c.topic) == standing}
@@ -239,37 +229,25 @@ class _Chooser:
 
     def lacking(self, role: str) -> UserError:
         what = ROLES[role].what
-        if role in CAMERAS:
-            video = [topic for topic in self.topics if topic.kind in VIDEO]
-            self.problems += [f"{t.name} is video ({t.kind}): record images" for t in video]
         if self.problems:
             return UserError(f"no {what}; {'; or '.join(self.problems[:2])}")
-        if not self.topics:
-            return UserError(f"no {what}; the file has no messages at all: record it again")
         has = sorted({f"{topic.name} ({topic.kind or _type(topic)})" for topic in self.topics})
-        types = ", ".join(ROLES[role].types)
         return UserError(
-            f"no {what}; the file has {few(has, SHOWN)}, and none of a type that is read for it"
-            f" ({types}): record one"
+            f"no {what}; the file has {few(has, SHOWN) or 'no messages at all'}, and none of a type"
+            f" that is read for it ({', '.join(ROLES[role].types)}): record one"
         )
 
     def _named(self, role: str, name: str) -> Choice:
         topics = [topic for topic in self.topics if topic.name == name]
-        where, types = f"setup.topics.{role}", ROLES[role].types
+        choices = [choice for t in topics if (choice := self._read(role, t, named=True))]
+        where = f"setup.topics.{role}"
+        if choices:
+            return replace(max(choices, key=lambda choice: len(choice.messages)), why=where)
         if not topics:
-            has = ", ".join(sorted({topic.name for topic in self.topics})[:SHOWN])
+            has = few(sorted({topic.name for topic in self.topics}), SHOWN)
             raise UserError(f"{where}: no topic {name}, the file has {has or 'none'}")
-        fitting = [topic for topic in topics if topic.kind in types]
-        if not fitting:
-            raise UserError(f"{where}: {name} is a {_type(topics[0])}, not {' or '.join(types)}")
-        largest = max(fitting, key=lambda topic: len(topic.log_times))
-        choice = self._read(role, largest, named=True)
-        if choice is None:
-            problem = (self.problems or [f"{name} has no messages, or fingers only"])[0]
-            raise UserError(f"{where}: {problem}")
-        if role in CAMERAS and (problem := undecodable(role, choice)):
-            raise UserError(f"{where}: {name}: {problem}")
-        return replace(choice, why=where)
+        problem = f"{name} is a {_type(topics[0])}, not {' or '.join(ROLES[role].types)}"
+        raise UserError(f"{where}: {(self.problems or [problem])[0]}")
 
     def _read(self, role: str, topic: Topic, named: bool = False) -> Choice | None:
         """What a topic says for a role; None, with a word in `problems`, where it is of no use."""
@@ -279,7 +257,9 @@ class _Chooser:
         try:
             if topic.problem:
                 raise UserError(topic.problem)
-            if role == "gripper":
+            if role in CAMERAS:
+                choice = _pictures(role, topic, named)
+            elif role == "gripper":
                 choice = _gripper(topic, named)
             elif what == {"joints"}:
                 choice = _arm(topic, self.setup)
@@ -292,38 +272,22 @@ class _Chooser:
             self.problems.append(str(error))
             return None
 
-    def _suits(self, role: str, choice: Choice) -> bool:
-        """Pictures: whether they are colour or depth, and of a kind that can be decoded."""
-        if role not in CAMERAS:
-            return True
-        picture, named = choice.typical.value, "depth" in choice.name.lower()
-        deep = images.is_depth(picture) or (picture.encoding == "mono16" and named)
-        problem = None
-        if deep == (role == "depth"):
-            problem = undecodable(role, choice)
-        elif named and role == "depth" and picture.encoding:
-            problem = f"encoding {picture.encoding!r} is no depth, {images.USE}"
-        if problem:
-            self.problems.append(f"{choice.name}: {problem}")
-        return deep == (role == "depth") and not problem
-
     def _info(self, infos: Sequence[Choice], role: str, chosen: dict[str, Choice]) -> Choice | None:
         """A camera info belongs to the images in whose folder it is, or with their frame and size.
 
         Depth may take the colour camera's where it is registered to colour: in its frame and size.
         """
         image, color = chosen[role], chosen["color"]
-        frame, size, ranked = image.typical.frame, _size(image), []
+        frame, size = image.typical.frame, _size(image)
+        fitting: list[tuple[bool, bool, int, Choice]] = []
         for info in infos:
             camera = info.typical.value.camera
-            beside, of_color = _beside(info.name, image.name), _beside(info.name, color.name)
-            own = beside and (role == "color" or not of_color)
-            of_frame = (camera.frame or (color.typical.frame if of_color else "")) == frame
-            fits = size in (None, (camera.width, camera.height))
-            if own or (of_frame and (fits or beside)):
-                why = f"{'beside' if beside else 'of the frame and size of'} {image.name}"
-                merit = own, of_frame, fits, beside, len(info.messages)
-                ranked.append((merit, replace(info, why=why)))
+            own = _beside(info.name, image.name)
+            own &= role == "color" or not _beside(info.name, color.name)
+            alike = 0 < len(frame) and camera.frame == frame
+            alike &= size in (None, (camera.width, camera.height))
+            if own or alike:
+                fitting.append((own, alike, len(info.messages), info))
             else:
                 pixels = f", {size[0]} x {size[1]}" if size else ""
                 self.problems.append(
@@ -331,7 +295,10 @@ class _Chooser:
                     f" pixels, {image.name} of {frame!r}{pixels}: record the camera info of those"
                     f" images, or name it in setup.topics.{role}_info"
                 )
-        return max(ranked, key=lambda entry: entry[0], default=(None, None))[1]
+        if not fitting:
+            return None
+        own, _, _, best = max(fitting, key=lambda entry: entry[:3])
+        return replace(best, why=f"{'beside' if own else 'of the frame and size of'} {image.name}")
 
 
 def _type(topic: Topic) -> str:
@@ -371,26 +338,39 @@ def _joints(topic: Topic, names: tuple[str, ...], frame: str | None = None) -> M
     return _mapped(topic, "joints", read)
 
 
-def _joint_names(topic: Topic) -> list[tuple[str, ...]]:
-    """Names in the first messages, the most frequent first. Raises UserError if there are none."""
+def _joint_names(topic: Topic) -> list[str]:
+    """Joints in the first messages, of all who publish. Raises UserError if there are none."""
     some = Choice(topic, _all(topic, "joints")).readings[:JOINT_TRIES]
-    counts = Counter(tuple(reading.value) for reading in some)
-    names = [some for some, _ in counts.most_common() if some]
+    names = [*dict.fromkeys(name for reading in some for name in reading.value)]
     if not names:
         raise UserError(f"{topic.name} has fewer than two readable messages (no positions)")
     return names
 
 
+def _pictures(role: str, topic: Topic, named: bool) -> Choice | None:
+    """Pictures that are colour or depth, as the role asks, and of a kind that can be decoded."""
+    choice = Choice(topic, _all(topic, "picture"))
+    picture = choice.typical.value
+    if not named and images.is_depth(picture) != (role == "depth"):
+        if role == "depth" and picture.encoding and "depth" in topic.name.lower():
+            what = f"encoding {picture.encoding!r} is no depth, {images.USE}"
+            raise UserError(f"{topic.name}: {what}")
+        return None
+    if problem := _undecodable(role, choice):
+        raise UserError(f"{topic.name}: {problem}")
+    return choice
+
+
 def _gripper(topic: Topic, named: bool) -> Choice | None:
     """The joints of a gripper, not of an arm; all joints where params name the topic."""
-    for names in _joint_names(topic):
-        fingers = tuple(filter(_is_finger, names))
-        if fingers or named or _is_finger(topic.name):
-            only = tuple(name for name in fingers if "finger" in name.lower())
-            moving = only or fingers or names
-            convert = partial(opening_of, topic=topic.name, names=moving)
-            return Choice(topic, _joints(topic, moving), convert=convert)
-    return None
+    names = _joint_names(topic)
+    fingers = [name for name in names if _is_finger(name)]
+    if not fingers and not named and not _is_finger(topic.name):
+        return None
+    only = [name for name in fingers if "finger" in name.lower()]
+    moving = tuple(only or fingers or names)
+    convert = partial(opening_of, topic=topic.name, names=moving)
+    return Choice(topic, _joints(topic, moving), convert=convert)
 
 
 def opening_of(values: np.ndarray, topic: str, names: tuple[str, ...]) -> np.ndarray:
@@ -411,25 +391,22 @@ def opening_of(values: np.ndarray, topic: str, names: tuple[str, ...]) -> np.nda
     return (fingers * np.sign(likeness)).sum(axis=1, keepdims=True)
 
 
-def _arm(topic: Topic, setup: SetupParams) -> Choice | None:
+def _arm(topic: Topic, setup: SetupParams) -> Choice:
     """Joint states through params' URDF."""
-    joint_names = _joint_names(topic)
-    arms = [some for some in joint_names if not all(map(_is_finger, some))]
-    if not arms:
-        return None
-    names = arms[0]
-    has = ", ".join(names[:SHOWN])
+    names = [name for name in _joint_names(topic) if not _is_finger(name)]
+    if not names:
+        raise UserError(f"{topic.name} has the joints of fingers alone")
+    has = few(names, SHOWN)
     if setup.urdf is None:
         raise UserError(
             f"{topic.name} has the joints {has}: put the robot's URDF into robots/ and name it in"
             " setup.urdf"
         )
     chain = chain_of(setup.urdf, setup.tip_link)
-    if not any(set(chain.names) <= set(some) for some in joint_names):
-        lacks = ", ".join([name for name in chain.names if name not in names][:SHOWN])
+    if lacks := [name for name in chain.names if name not in names]:
         raise UserError(
-            f"{topic.name} lacks joint {lacks} of {setup.urdf}, it has {has}: check setup.urdf and"
-            " setup.tip_link"
+            f"{topic.name} lacks joint {few(lacks, SHOWN)} of {setup.urdf}, it has {has}: check"
+            " setup.urdf and setup.tip_link"
         )
     return Choice(topic, _joints(topic, chain.names, chain.root), convert=chain.poses)
 
@@ -449,7 +426,7 @@ def _hand(topic: Topic, setup: SetupParams, still: TransformTree) -> Choice:
     some = Choice(topic, _all(topic, "transforms")).readings[:JOINT_TRIES]
     moving = {child: parent for reading in some for parent, child in reading.value}
     parents = still.parents | moving
-    tools = [name for name in parents if {*name.lower().split("_")} & TOOLS]
+    tools = filter(is_tool, parents)
     chains = []
     for tip in [setup.tip_link] if setup.tip_link in parents else sorted(tools):
         up = [tip]
@@ -488,36 +465,22 @@ def _size(image: Choice) -> tuple[int, int] | None:
     return sizes.most_common(1)[0][0] if sizes else None
 
 
-def undecodable(role: str, choice: Choice) -> str | None:
+def _undecodable(role: str, choice: Choice) -> str | None:
     """Why none of some pictures of a topic can be decoded; None where one can."""
-    pictures, reasons = choice.readings, Counter()
+    pictures, reasons = choice.readings, []
     for k in np.unique(np.linspace(0, len(pictures) - 1, TRIES).astype(int)):
         try:
             getattr(images, role)(pictures[k].value)
-        except images.Unsupported as error:
-            reasons[str(error)] += 1
         except images.Undecodable as error:
-            reasons[f"its {COLOUR[role]} pictures cannot be decoded: {error}"] += 1
+            reasons.append(str(error))
         else:
             return None
-    return reasons.most_common(1)[0][0]
+    return f"its {COLOUR[role]} pictures cannot be decoded: {reasons[0]}"
 
 
 def _source(topic: str) -> str:
     """A topic's name without that of the transport, by which one picture is sent several times."""
     return topic.removesuffix("/compressed").removesuffix("/compressedDepth")
-
-
-def _nearest(depths: list[Choice], color: Choice) -> list[Choice]:
-    """Those in the colour's frame, or else those that share the most folders with its topic."""
-    frame = color.typical.frame
-
-    def near(depth: Choice) -> tuple[bool, int]:
-        folders = (name.split("/")[:-1] for name in (depth.name, color.name))
-        return bool(frame) and depth.typical.frame == frame, len(commonprefix([*folders]))
-
-    most = max(map(near, depths))
-    return [depth for depth in depths if near(depth) == most]
 
 
 def _beside(info: str, image: str) -> bool:
@@ -527,13 +490,10 @@ def _beside(info: str, image: str) -> bool:
 
 
 def _why(role: Role, best: Choice, fitting: list[Choice]) -> str:
-    if len(fitting) == 1:
+    others = sorted({choice.name for choice in fitting} - {best.name})
+    if not others:
         return f"the only {best.topic.kind} for {role.what.partition(' (')[0]}"
-    hints = _hints(role, best.name)
-    named = f"named {' '.join(hints)}, " if hints else ""
-    others = sorted({choice.name for choice in fitting} - {best.name})[:2]
-    rest = f"; not {', '.join(others)}" if others else ""
-    return f"of {len(fitting)} topics: {named}{_rate(best.topic):.0f} Hz{rest}"
+    return f"at {_rate(best.topic):.0f} Hz; not {few(others, 2)}"
 
 
 def transforms_of(container: Container) -> TransformTree:

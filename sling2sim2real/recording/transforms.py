@@ -89,5 +89,10 @@ class TransformTree:
         return chain
 
 
+def is_tool(frame: str) -> bool:
+    """Whether a frame or link is named like the tool centre point: hand_tcp, ee_link."""
+    return any(f"_{word}_" in f"_{frame.lower()}_" for word in ("tcp", "ee", "end_effector"))
+
+
 def _bare(frame: str) -> str:
     return frame.lstrip("/")

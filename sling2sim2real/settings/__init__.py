@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar, Self
 
-from pydantic import ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 from ruamel.yaml import YAML, YAMLError
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.schema import Name, Section, explained, refusal
 from sling2sim2real.base.target import TARGET_AREA
 from sling2sim2real.settings.identification import (
-    METHODS,
     LossParams,
     MethodDefaults,
     MethodParams,
@@ -21,6 +20,7 @@ from sling2sim2real.settings.identification import (
     ParameterBoxes,
     SlingParams,
     check_method,
+    default_methods,
 )
 from sling2sim2real.settings.lab import BandParams, PlanParams, SetupParams
 from sling2sim2real.settings.launches import LaunchParams, PolicyParams, TrialsParams
@@ -44,7 +44,7 @@ class Settings(Section):
 
     Bands are not among them: functions are given theirs. SI units; params.yaml says what each key
     means. Frozen; `changed` gives another one. A wrong key or value is a UserError of one line that
-    names it.
+    names it. Defaults are made when they are asked for: a stage has all of its file.
 
     >>> from sling2sim2real import Settings
     >>> settings = Settings.default(setup={"fork_width": 0.30})
@@ -58,21 +58,21 @@ class Settings(Section):
 
     passed_over: ClassVar[tuple[str, ...]] = ("run", "floor", "rig")  # of an experiment's file
 
-    setup: SetupParams = SetupParams()
-    plan: PlanParams = PlanParams()
-    episode: EpisodeParams = EpisodeParams()
-    force: ForceParams = ForceParams()
-    cloud: CloudParams = CloudParams()
-    sling: SlingParams = SlingParams()
-    parameters: ParameterBoxes = ParameterBoxes()
-    loss: LossParams = LossParams()
-    optimizer: OptimizerParams = OptimizerParams()
-    method_defaults: MethodDefaults = MethodDefaults()
-    methods: dict[Name, MethodParams] = METHODS
-    policy: PolicyParams = PolicyParams()
-    launch: LaunchParams = LaunchParams()
-    trials: TrialsParams = TrialsParams()
-    bands: dict[Name, BandParams] = {}
+    setup: SetupParams = Field(default_factory=SetupParams)
+    plan: PlanParams = Field(default_factory=PlanParams)
+    episode: EpisodeParams = Field(default_factory=EpisodeParams)
+    force: ForceParams = Field(default_factory=ForceParams)
+    cloud: CloudParams = Field(default_factory=CloudParams)
+    sling: SlingParams = Field(default_factory=SlingParams)
+    parameters: ParameterBoxes = Field(default_factory=ParameterBoxes)
+    loss: LossParams = Field(default_factory=LossParams)
+    optimizer: OptimizerParams = Field(default_factory=OptimizerParams)
+    method_defaults: MethodDefaults = Field(default_factory=MethodDefaults)
+    methods: dict[Name, MethodParams] = Field(default_factory=default_methods)
+    policy: PolicyParams = Field(default_factory=PolicyParams)
+    launch: LaunchParams = Field(default_factory=LaunchParams)
+    trials: TrialsParams = Field(default_factory=TrialsParams)
+    bands: dict[str, BandParams] = {}  # a folder's name may have a hyphen
 
     @classmethod
     def default(cls, **changes: Mapping) -> Self:

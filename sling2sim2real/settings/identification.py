@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import (
@@ -26,7 +27,14 @@ POSTERIOR, PAPER = "posterior", "paper"
 UNSEEN = tuple(  # what a pull does not show
     row.name for row in parameters("neo_hookean") if row.coordinate is None
 )
-SEARCHES = ("multistart", POSTERIOR, "de", "bo", "adam")
+_FOLDER = "sling2sim2real.identification.searches"
+SEARCHES = {  # what the rows of each are called, and its function
+    "multistart": ("de", f"{_FOLDER}.de:differential_evolution"),
+    POSTERIOR: ("design", "sling2sim2real.identification.search:design"),
+    "de": ("de", f"{_FOLDER}.de:differential_evolution"),
+    "bo": ("bo", f"{_FOLDER}.bo:bayesian"),
+    "adam": ("adam", f"{_FOLDER}.adam:adam"),
+}
 OWN = "own"  # any other: a function of the user's
 OUR_ENGINE = "sling"
 ENGINES = OUR_ENGINE, "physx"
@@ -69,7 +77,7 @@ def _axis(row: Parameter) -> Any:
     kind = create_model(row.name, __base__=Box, low=bound, high=bound)
     kind.scale = row.scale
     low, high = row.box
-    return kind, kind(low=low, high=high)
+    return kind, Field(default_factory=partial(kind, low=low, high=high))
 
 
 _BOXES = {row.name: _axis(row) for row in parameters("neo_hookean") if row.name in THETA}
@@ -157,7 +165,7 @@ class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
     law: Law = "corotated"
-    search: Annotated[str, _one_of(SEARCHES, "function")] = "multistart"
+    search: Annotated[str, _one_of((*SEARCHES,), "function")] = "multistart"
     engine: Annotated[str, _one_of(ENGINES, "function")] = "sling"
     settings: dict[str, Setting] = {}
     fixed: dict[str, Value] = {}
@@ -165,7 +173,7 @@ class MethodDefaults(Section):
     k_top: KTop | None = None
     mounting: bool = True
     covariance: bool = True
-    weights: Weights = Weights()
+    weights: Weights = Field(default_factory=Weights)
 
 
 class MethodParams(MethodDefaults):
@@ -209,14 +217,11 @@ class MethodParams(MethodDefaults):
         return self
 
 
-METHODS = {
-    PAPER: MethodParams(),  # the paper's
-    POSTERIOR: MethodParams(  # ours: the mode of one density over all recordings and launches
-        search=POSTERIOR,
-        law="rubber",
-        fixed={row.name: row.fixed for row in parameters("rubber") if row.fixed is not None},
-    ),
-}
+def default_methods() -> dict[str, MethodParams]:
+    """The paper's; and ours, the mode of one density over all recordings and launches."""
+    fixed = {row.name: row.fixed for row in parameters("rubber") if row.fixed is not None}
+    ours = MethodParams(search=POSTERIOR, law="rubber", fixed=fixed)
+    return {PAPER: MethodParams(), POSTERIOR: ours}
 
 
 def parameter_names(law: str) -> tuple[str, ...]:

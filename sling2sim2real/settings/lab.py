@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BeforeValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from sling2sim2real.base.schema import (
     ASCENDING,
@@ -84,7 +84,7 @@ class SetupParams(Section):
     urdf: FileName | None = None
     tip_link: str | None = None
     tool: Tool | None = None
-    topics: Topics = Topics()
+    topics: Topics = Field(default_factory=Topics)
 
 
 Speed = Annotated[float, Range(0.005, 3)]
@@ -137,15 +137,19 @@ class Dip(Section):
     back_time: Annotated[float, Range(0.05, 20)]
 
 
-class PlanParams(Section):
-    """How a robot records a band: read by `sling plan`, and by the virtual rig for its dips."""
-
-    draw: Annotated[tuple[DrawY, DrawZ], LIST] = (-0.4, 0.0)
-    dips: Annotated[tuple[Dip, ...], LIST] = (
+def _dips() -> tuple[Dip, ...]:
+    return (
         Dip(at=0.8, depth=0.21, out_time=1.05, back_time=1.05),
         Dip(at=1.0, depth=0.26, out_time=1.3, back_time=1.3),
         Dip(at=1.0, depth=0.23, out_time=1.15, back_time=1.15),
     )
+
+
+class PlanParams(Section):
+    """How a robot records a band: read by `sling plan`, and by the virtual rig for its dips."""
+
+    draw: Annotated[tuple[DrawY, DrawZ], LIST] = (-0.4, 0.0)
+    dips: tuple[Dip, ...] = Field(default_factory=_dips, strict=False)
     max_speed: Speed = 0.4
     pull_speed: Speed = 0.2
     max_acceleration: Annotated[float, Range(0.05, 30)] = 2.0
@@ -157,7 +161,7 @@ class PlanParams(Section):
     retreat: Way = 0.06
     floor_clearance: Way = 0.1
     hanging: Annotated[float, Range(0, 3)] | None = None
-    gripper: Gripper = Gripper()
+    gripper: Gripper = Field(default_factory=Gripper)
     orientation: Quaternion | None = None
     frame: Annotated[str, FILLED] = "base"
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+from pydantic import Field
+
 from sling2sim2real.base.schema import ASCENDING, FILLED, LIST, UNIQUE, Range, Section, Seed
 
 Distance = Annotated[float, Range(0.1, 20)]  # along the floor, m
@@ -40,7 +42,7 @@ class PolicyParams(Section):
     learning_rate: Annotated[float, Range(1e-7, 1)] = 0.001
     init_std: Annotated[float, Range(1e-3, 10)] = 0.5
     final_std: Annotated[float, Range(1e-4, 10)] = 0.005
-    reward: Reward = Reward()
+    reward: Reward = Field(default_factory=Reward)
 
 
 class TrialsParams(Section):

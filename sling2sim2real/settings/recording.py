@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from sling2sim2real.base.schema import Range, Section, refusal
 
@@ -22,7 +22,7 @@ class EpisodeParams(Section):
     duration: Annotated[float, Range(1, 120)] = 9.0
     longest: Annotated[float, Range(1, 120)] = 20.0
     tail: Annotated[float, Range(0.1, 60)] = 0.7
-    delays: DelayParams = DelayParams()
+    delays: DelayParams = Field(default_factory=DelayParams)
 
     @model_validator(mode="after")
     def _within(self) -> EpisodeParams:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -18,7 +17,6 @@ from sling2sim2real.simulator.rubber import BRANCH_TIMES_S, RUBBER, flowing, ove
 from sling2sim2real.simulator.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from sling2sim2real.simulator.solver import Options, Slings, run
 
-FEWEST_LAUNCHES_A_DEVICE = 1024  # launches: a device more for fewer would only cost its start
 HISTORY_STEPS = 200  # of a pull
 NUDGE_M = 1e-3  # m of a draw, small against its box and large against the simulator's rounding
 CENTRAL_DIFFERENCES_M = NUDGE_M * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
@@ -109,7 +107,7 @@ def launch(
     draws: np.ndarray,
     *,
     max_force: float = np.inf,
-    device: str | Sequence[str] = "cpu",
+    device: str = "cpu",
     workers: int = 1,
     refine: int = 1,
     double: bool = False,
@@ -118,8 +116,7 @@ def launch(
 
     Args:
         max_force: A draw that takes more is a failed launch [N].
-        device: Or several of one kind, which share a large batch evenly.
-        workers: Threads, on the CPU; results depend on them as little as on the devices' number.
+        workers: Threads, on the CPU; results do not depend on their number.
         refine: How many times finer the steps are than `setup.step`.
     """
     draws = np.atleast_2d(draws).astype(float)
@@ -134,18 +131,8 @@ def launch(
         band, parameters, drawn_guess(band, draws), direction=direction,
         payload=setup.projectile_mass, **memory_of_pull(band, setup.history, parameters, draws),
     )  # fmt: skip
-    schedule = schedule_of(setup, refine)
-
-    def launched_on(place: str, share: np.ndarray) -> np.ndarray:
-        options = Options(place, workers, launching=True, double=double)
-        return run(band, schedule, slings[share], options=options).lanes
-
-    devices = (
-        [device] if isinstance(device, str) else device[: max(count // FEWEST_LAUNCHES_A_DEVICE, 1)]
-    )
-    shares = np.array_split(np.arange(count), len(devices))
-    with ThreadPoolExecutor(len(devices)) as pool:
-        lanes = np.concatenate(list(pool.map(launched_on, devices, shares)))
+    options = Options(device, workers, launching=True, double=double)
+    lanes = run(band, schedule_of(setup, refine), slings, options=options).lanes
     return limited(outcomes(band, setup, parameters, lanes, draws), max_force)
 
 

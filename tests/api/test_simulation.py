@@ -59,6 +59,15 @@ def test_a_planned_pull_rests_at_its_ends(world) -> None:
     assert np.allclose(line[held, line.shape[1] // 2, 1], hand[held], atol=2e-3)
 
 
+def test_a_pull_with_dips_lets_the_band_back(world) -> None:
+    """By the ways of settings.plan, and it ends where it would without them."""
+    for dips, back in ((False, 0.0), (True, sum(dip.depth for dip in world.settings.plan.dips))):
+        planned = pull(world, dips=dips)
+        way = planned.position[planned.time < planned.release_time, 1]
+        assert np.diff(way).clip(min=0).sum() == pytest.approx(back, abs=0.01)
+        assert way[-1] == pytest.approx(-0.4, abs=1e-3)
+
+
 @pytest.mark.parametrize("wrong", ["pull_time", "pause", "frame_rate"])
 def test_a_pull_takes_time(world, wrong: str) -> None:
     with pytest.raises(UserError, match="must be above 0"):

@@ -15,39 +15,28 @@ def three(monkeypatch):
     monkeypatch.setattr(machine, "gpus", lambda: ("cuda:0", "cuda:1", "cuda:2"))
 
 
-def test_the_environment_says_devices_and_workers(monkeypatch, three) -> None:
+def test_the_environment_says_device_and_workers(monkeypatch, three) -> None:
     for name in ("SLING_DEVICE", "SLING_WORKERS"):
         monkeypatch.delenv(name, raising=False)
-    assert (machine.devices(), machine.kind(), machine.workers()) == (("cpu",), "cpu", None)
+    assert (machine.device(), machine.kind(), machine.workers()) == ("cpu", "cpu", None)
     monkeypatch.setenv("SLING_DEVICE", "cuda:1")
     monkeypatch.setenv("SLING_WORKERS", "3")
-    assert (machine.devices(), machine.kind(), machine.workers()) == (("cuda:1",), "cuda", 3)
+    assert (machine.device(), machine.kind(), machine.workers()) == ("cuda:1", "cuda", 3)
 
 
-def test_several_gpus_are_named(three) -> None:
-    assert machine.named("cuda", "--device") == ("cuda:0", "cuda:1", "cuda:2")
-    for text in ("cuda:2", "cuda:2,cuda:0"):
-        assert machine.named(text, "--device") == tuple(text.split(","))
-
-
-def test_a_gpu_that_is_not_there_or_named_twice_is_refused(three, monkeypatch) -> None:
-    for text in ("cuda:3", "cuda:0,cuda:3"):
-        with pytest.raises(UserError) as error:
-            machine.named(text, "--device")
-        assert str(error.value) == (
-            f"--device {text}: cuda:3 is not there; CUDA sees cuda:0, cuda:1, cuda:2"
-        )
-    with pytest.raises(UserError, match="cuda:0,cuda:0: names a GPU twice"):
-        machine.named("cuda:0,cuda:0", "SLING_DEVICE")
+def test_a_gpu_is_named_or_refused(three, monkeypatch) -> None:
+    assert [machine.named(text, "") for text in ("cuda", "cuda:2")] == ["cuda:0", "cuda:2"]
+    with pytest.raises(UserError, match="^--device cuda:3: .*CUDA sees cuda:0, cuda:1, cuda:2$"):
+        machine.named("cuda:3", "--device")
     monkeypatch.setattr(machine, "gpus", lambda: ())
     for text in ("cuda", "cuda:0"):
-        with pytest.raises(UserError, match=f"^--device {text}: CUDA sees no GPU"):
+        with pytest.raises(UserError, match=f"^--device {text}: .*CUDA sees no GPU"):
             machine.named(text, "--device")
 
 
 def test_anything_else_is_refused(monkeypatch) -> None:
-    devices = "tpu cpu,cpu cpu,cuda:0 cuda,cuda:0 cuda: cuda:-1 cuda:01 cuda:0,"
-    wrong = {"DEVICE": (machine.devices, devices), "WORKERS": (machine.workers, "0 -1 two 1.5 ² ٢")}
+    devices = "tpu cpu,cuda:0 cuda:0,cuda:1 cuda: cuda:-1 cuda:01 cuda:0,"
+    wrong = {"DEVICE": (machine.device, devices), "WORKERS": (machine.workers, "0 -1 two 1.5 ² ٢")}
     for name, (read, texts) in wrong.items():
         for text in texts.split():
             monkeypatch.setenv(f"SLING_{name}", text)

@@ -80,6 +80,6 @@ def test_without_a_density_it_tells_less(inputs) -> None:
     plain = replace(inputs, found=replace(inputs.found, confidence={}, samples=None))
     card = content(plain, concluded(plain))
     assert card["verdict"] != "can be trusted"
-    assert any("does not tell how sure" in reason for reason in card["reasons"])
+    assert any("no uncertainty" in reason for reason in card["reasons"])
     assert all(value["low"] is None for value in card["values"])
-    assert "This method does not tell how near it comes" in card_text(plain, concluded(plain))
+    assert "This method gives no such differences" in card_text(plain, concluded(plain))

@@ -34,7 +34,7 @@ def test_steps_are_cures_and_then_gains_the_largest_first() -> None:
     assert steps[0] == "Do this." and steps.count("Do this.") == 1
     after = [float(re.search(r" to (?:about )?([\d.]+)", step)[1]) for step in steps[1:]]
     assert len(after) >= 2 and after == sorted(after)
-    assert "Measure a launch and tell it with `sling observe`" in " ".join(steps)
+    assert "Measure a launch and add it with `sling observe`" in " ".join(steps)
     more = next_steps(reasons, model, np.array([1.7, 1.9]), [still(0.0)], launches=2)
     assert "Measure another launch" in " ".join(more)
     assert "1.9 m" in steps[1]
@@ -75,7 +75,7 @@ def test_where_nothing_helps_it_says_so() -> None:
     model = LandingModel(NAMES, 1e-12 * np.eye(4), GRADIENT, np.zeros(2), np.ones(2))
     exact = LandingModel(NAMES, 1e-12 * np.eye(4), GRADIENT, np.full(2, 1e-9), np.ones(2))
     assert next_steps([], None, np.array([1.7]), [still(0.0)]) == [
-        "Nothing more would narrow the landings by much: launch."
+        "No further measurement would narrow the landings by much: launch."
     ]
     assert model.after(draw=0.0)[0] == pytest.approx(1.0)
     assert len(next_steps([], exact, np.array([1.7, 1.9]), [still(0.0)])) >= 1

@@ -29,16 +29,16 @@ GOOD = Findings(
 )  # fmt: skip
 CASES = [
     ({"cautions": (("In pull 1 of a.mcap, the force drifts.", "Warm up."),)}, CARE, "force drifts"),
-    ({"settled": None}, CARE, "does not tell how sure"),
+    ({"settled": None}, CARE, "no uncertainty"),
     ({"settled": False}, CARE, "not settled"),
-    ({"effective": 3.2}, CARE, "rest on 3 samples"),
-    ({"force": 0.2}, CARE, "force of the pull: 0.2 N off"),
-    ({"force": 0.9}, NO, "does not meet the force"),
-    ({"held": 3e-3}, CARE, "band in the hand: 3 mm off"),
-    ({"recoil": 8e-3}, CARE, "recoil: 8 mm off"),
-    ({"recoil": 0.03}, NO, "does not meet the recoil"),
+    ({"effective": 3.2}, CARE, "sample size is 3,"),
+    ({"force": 0.2}, CARE, "force of the pull: it is 0.2 N off"),
+    ({"force": 0.9}, NO, "does not match the force"),
+    ({"held": 3e-3}, CARE, "drawn band: it is 3 mm off"),
+    ({"recoil": 8e-3}, CARE, "recoil: it is 8 mm off"),
+    ({"recoil": 0.03}, NO, "does not match the recoil"),
     ({"disagreement": 2.6, "odd": "pull 2 of b.mcap"}, CARE, "pull 2 of b.mcap"),
-    ({"at_sides": (("relaxation", "upper side of its box, 0 to 20 %"),)}, CARE, "relaxation"),
+    ({"at_sides": (("relaxation", "upper end of its bounds, 0 to 20 %"),)}, CARE, "relaxation"),
     ({"stretch": 1.7}, CARE, "1.70 times its length, the recording only to 1.60"),
     ({"stretch": 2.2}, NO, "2.20 times"),
     ({"hold_force": 28.0}, CARE, "28.0 N"),
@@ -49,7 +49,7 @@ CASES = [
     ({"half_width": 0.6, "sides": "−70/+50"}, NO, "−70/+50 cm only"),
     ({"half_width": np.nan}, CARE, "not known"),
     ({"outside": 6}, CARE, "6 of 15 virtual launches"),
-    ({"outside": 6, "off": 0.3}, NO, "30 cm off in the mean"),
+    ({"outside": 6, "off": 0.3}, NO, "30 cm off on average"),
     ({"left": 0.09}, CARE, "9 % off"),
     ({"left": 0.4}, NO, "40 % off"),
     ({"scores": 1, "outside": 1, "off": 0.3}, CARE, "30 cm off"),
@@ -59,13 +59,13 @@ CASES = [
     (
         {"outside": 0, "scores": 0, "unloaded": False},
         CARE,
-        "No launch was measured, and no recording lets the drawn band back",
+        "No launch was measured, and no recording unloads the band",
     ),
     ({"bias": -0.02, "bias_error": 0.004, "bias_of_half": -0.5}, CARE, "landed 2.0 % short"),
     ({"bias": 0.03, "bias_error": 0.004, "bias_of_half": 0.6}, CARE, "landed 3.0 % long"),
-    ({"observed": 1, "surprising": 1}, CARE, "1 of 1 launch used as evidence landed outside"),
-    ({"carried": 0.1}, CARE, "weighed 0.1 times"),
-    ({"carried": 1.7}, CARE, "weighed 1.7 times"),
+    ({"observed": 1, "surprising": 1}, CARE, "1 of 1 launch used for the fit landed outside"),
+    ({"carried": 0.1}, CARE, "was 0.1 times"),
+    ({"carried": 1.7}, CARE, "was 1.7 times"),
 ]
 NO_REASON = [
     {"bias": -0.02, "bias_error": 0.02, "bias_of_half": -0.5},  # chance
@@ -118,11 +118,11 @@ def test_a_density_that_no_solid_rubber_has_is_asked_about(density, requested) -
 def test_one_launch_is_called_one() -> None:
     assert reasons_of(GOOD, [])[-1] == (
         "14 of 15 virtual launches landed inside their 90 % intervals, -1.0 % from the prediction"
-        " in the mean."
+        " on average."
     )
     single = replace(GOOD, scores=1, outside=0, kind="measured")
-    assert "The one measured launch landed inside" in reasons_of(single, [])[-1]
-    assert "One launch is part of the evidence" in reasons_of(replace(GOOD, observed=1), [])[-1]
+    assert "The only measured launch landed inside" in reasons_of(single, [])[-1]
+    assert "only one measured launch" in reasons_of(replace(GOOD, observed=1), [])[-1]
 
 
 def test_the_weight_that_the_hand_carries(summary) -> None:
@@ -179,5 +179,5 @@ def test_findings_see_a_bad_score_a_side_and_odd_evidence(summary) -> None:
     assert result.density == pytest.approx(summary.params.bands[summary.band].density)
     assert result.odd == "pull 3 of `0.3.mcap`"
     assert result.at_sides == [
-        ("stress relaxation per decade of time", "upper side of its box, 0 to 20 %")
+        ("stress relaxation per decade of time", "upper end of its bounds, 0 to 20 %")
     ]

@@ -51,9 +51,8 @@ def test_elsewhere_it_is_refused(tmp_path) -> None:
     [
         ("pipeline.flow.__main__", "theta@band1 --workers 2", "targets", ["theta@band1"]),
         ("pipeline.flow.__main__", "--workers 2", "workers", 2),
-        ("pipeline.flow.__main__", "--gpus 2", "gpus", 2),
         ("pipeline.flow.__main__", "--dask tcp://10.0.0.5:8786", "dask", "tcp://10.0.0.5:8786"),
-        ("pipeline.flow.ui", "--port 4201", "port", 4201),
+        ("pipeline.flow.server", "--port 4201", "port", 4201),
         ("validation.verify", "--device cuda:0", "device", "cuda:0"),
         ("validation.bench", "--law rubber", "law", "rubber"),
         ("validation.bench", "--json", "json", True),

@@ -55,13 +55,13 @@ ADDED = {
     f" --base-to-camera={POSE}, --camera-to-fork=0,0,0.9,1,0,0,0, --floor=-0.1, --draw-y=-0.4,-0.3,"
     " --draw-z=-0.2,-0.1, --tool=0.7,0,0,0.05, --topic wrench=/ft, --json",
     PLAN: "--mass 0.05, --diameter 0.02, --rest-length 0.5, --draw=-0.30,-0.1,"
-    " --recording none.mcap, --pull paper, --precondition 1, --pulls 2, --out there, --rate 50,"
+    " --recording none.mcap, --pull paper, --pulls 2, --out there, --rate 50,"
     " --json",
     LAUNCH: "--theta none.json, --json",
     "aim bands/toy --target 19": "--force, --json",
     OBSERVE: "--error 0.002, --check, --json",
     OBSERVE.replace("2.3", "2.2"): "--again",
-    EXPORT: "--out there, --json",
+    EXPORT: "--out there, --samples 2, --json",
 }
 CASES |= {
     f"{line.split()[0]} {option.split()[0].partition('=')[0]}": (line, f"{line} {option}")
@@ -134,8 +134,8 @@ def echo(patch: pytest.MonkeyPatch) -> None:
     def look_at(*given) -> Look:
         return Look(new_report(given[0], given[2].facts) | {"notes": [repr(given[2:])]})
 
-    def export(found, to, out, episode) -> SimpleNamespace:
-        return SimpleNamespace(folder=out, card={"files": [str(to), str(out)]})
+    def export(found, to, out, samples) -> SimpleNamespace:
+        return SimpleNamespace(folder=out, card={"files": [str(to), str(out), f"{samples}"]})
 
     patch.setattr("sling2sim2real.cli.fit.fit", fit)
     patch.setattr("sling2sim2real.cli.observe.fit", lambda folder: None)

@@ -52,7 +52,7 @@ def test_without_rerun_or_an_episode_one_line_says_so(sling, copied, monkeypatch
         patch.setitem(sys.modules, "rerun", None)
         done = sling("view", f"bands/{NAME}", folder=copied)
     assert done.returncode == 1 and done.stderr.count("\n") == 1
-    assert "pip install 'sling2sim2real[view]'" in done.stderr
+    assert "rerun is not installed: pip install '.[view]'" in done.stderr
     pytest.importorskip("rerun", reason="rerun-sdk: pip install -e '.[view]'")
     for recording in (copied / "bands" / NAME / "recordings").iterdir():
         recording.unlink()

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from pipeline.params import load
 from pipeline.report import paper
-from sling2sim2real.drawing.styles import FEW, KNOWN, drawn, styles
+from sling2sim2real.drawing.styles import KNOWN, styles
 from tests.project import DEFAULTS
 
 METHODS = st.lists(st.sampled_from([*KNOWN, "mine", "yours", "theirs"]), unique=True, min_size=1)
@@ -29,12 +29,3 @@ def test_a_method_looks_the_same_in_every_company(methods: list[str]) -> None:
         assert named[method] == styles([method])[method]
     others = [method for method in methods if method not in KNOWN]
     assert all(named[method].name == method for method in others)
-
-
-@given(METHODS)
-def test_ours_the_papers_and_its_baselines_are_drawn_first(methods: list[str]) -> None:
-    chosen = drawn(methods)
-    assert len(chosen) == min(FEW, len(methods))
-    assert chosen == [method for method in methods if method in chosen]
-    first = ["posterior", "paper"]
-    assert set(first) & set(methods) <= set(chosen)

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.layout import ROOT
 from sling2sim2real import Band, Model, Theta
-from sling2sim2real.base.code import ROOT
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.exporting.chain import TIME_STEPS_S, SpringChain
 

@@ -15,6 +15,12 @@ from validation.projects import CLI
 def test_what_it_refuses(model, tmp_path, monkeypatch) -> None:
     with pytest.raises(UserError, match="to: must be one of mjcf, newton, usd, got 'drake'"):
         export(model, "drake", tmp_path / "toy")
+    for to, count, expected in (
+        ("usd", 3, "samples: only for mjcf and newton"),
+        ("mjcf", 6, "samples: must be from 0 to 5, which the band has, got 6"),
+    ):
+        with pytest.raises(UserError, match=expected):
+            export(model, to, tmp_path / "toy", samples=count)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").touch()
     with pytest.raises(UserError, match="holds something else than an export"):

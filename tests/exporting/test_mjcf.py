@@ -11,6 +11,7 @@ import pytest
 
 from sling2sim2real import UserError, export
 from sling2sim2real.exporting.chain import SpringChain
+from sling2sim2real.exporting.match import HOLD_LIMIT, LANDING_LIMIT
 from sling2sim2real.exporting.mujoco_replay import MujocoBand
 from tests.exporting import replayed
 from tests.exporting.replayed import DRAW
@@ -18,7 +19,7 @@ from tests.exporting.replayed import DRAW
 
 @pytest.fixture(scope="module")
 def done(model, tmp_path_factory):
-    return export(model, "mjcf", tmp_path_factory.mktemp("exports") / "toy")
+    return export(model, "mjcf", tmp_path_factory.mktemp("exports") / "toy", samples=5)
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +41,16 @@ def test_what_its_card_says_runs_without_this_project(done, outside) -> None:
     row = done.card["proof"][0]
     assert force == pytest.approx(row["hold_force_there_n"], rel=2e-3)
     assert landing == pytest.approx(row["landing_there_m"], rel=2e-3)
+
+
+def test_samples_are_bands_of_their_own(model, done, chain, monkeypatch) -> None:
+    replayed.assert_samples(model, done)
+    replay = MujocoBand(chain)
+    replay.model = replayed.loaded(done, monkeypatch)["model"]
+    replay.data = mujoco.MjData(replay.model)
+    shot, ours = replay.launch(DRAW), model.launches(DRAW, model.samples[:1])
+    assert shot.hold_force == pytest.approx(ours.hold_force[0], rel=HOLD_LIMIT)
+    assert shot.landing == pytest.approx(ours.landing_y[0], rel=LANDING_LIMIT)
 
 
 def test_another_band_would_be_noticed(model, chain) -> None:
@@ -74,7 +85,7 @@ def test_drawn_it_pulls_as_its_springs_and_hanging_it_is_slack(chain) -> None:
 
 @pytest.mark.slow
 def test_equal_bands_give_equal_bytes(model, done, tmp_path) -> None:
-    again = export(model, "mjcf", tmp_path / "again")
+    again = export(model, "mjcf", tmp_path / "again", samples=5)
     for file in done.folder.iterdir():
         assert file.read_bytes() == (again.folder / file.name).read_bytes(), file.name
 

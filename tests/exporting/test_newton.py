@@ -10,6 +10,7 @@ import pytest
 from sling2sim2real import UserError, export
 from sling2sim2real.exporting import mjcf, mujoco_replay
 from sling2sim2real.exporting.chain import SpringChain
+from sling2sim2real.exporting.match import HOLD_LIMIT, LANDING_LIMIT
 from sling2sim2real.exporting.newton_replay import NewtonReplay, loader, numbers
 from sling2sim2real.simulator.launch import ballistic_landing
 from sling2sim2real.simulator.model import GRAVITY
@@ -21,7 +22,7 @@ pytest.importorskip("newton", reason="newton: pip install -e '.[export]'")
 
 @pytest.fixture(scope="module")
 def done(model, tmp_path_factory):
-    return export(model, "newton", tmp_path_factory.mktemp("exports") / "toy")
+    return export(model, "newton", tmp_path_factory.mktemp("exports") / "toy", samples=5)
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +49,15 @@ def test_what_its_card_says_runs_without_this_project(done, outside) -> None:
     rows = done.card["proof"]
     assert forces == pytest.approx([row["hold_force_there_n"] for row in rows], abs=0.006)
     assert landings == pytest.approx([row["landing_there_m"] for row in rows], rel=2e-3)
+
+
+def test_samples_are_bands_of_their_own(model, done, monkeypatch) -> None:
+    replayed.assert_samples(model, done)
+    monkeypatch.syspath_prepend(done.folder)
+    bands = replayed.loaded(done, monkeypatch)["bands"]
+    ours = model.launches(DRAW, model.samples[:1])
+    assert bands.draw([DRAW])[0] == pytest.approx(ours.hold_force[0], rel=HOLD_LIMIT)
+    assert bands.launch()[0][0] == pytest.approx(ours.landing_y[0], rel=LANDING_LIMIT)
 
 
 def test_another_band_would_be_noticed(model, chain) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.flow.dvc import StageFailed, cause, named, repro, stale
+from pipeline.flow.dvc import cause, environment, named, repro, stale
 from sling2sim2real.base.errors import UserError
 from tests.flow.toy import Toy, stage
 
@@ -56,43 +56,46 @@ def test_why_a_command_failed(lines: tuple[str, ...], expected: str) -> None:
 def toy(tmp_path: Path) -> Toy:
     stages = {
         "one": stage("echo 1 >> runs; echo 1 > one.txt", "one.txt"),
-        "two": stage("echo line; cp one.txt two.txt", "two.txt", "one.txt", meta={"gpu": True}),
+        "two": stage("echo line; cp one.txt two.txt", "two.txt", "one.txt"),
         "three": stage("[ ! -e bad ] && cp two.txt three.txt", "three.txt", "two.txt"),
         "other": stage("echo 1 > other.txt", "other.txt"),
     }
     return Toy(tmp_path, stages)
 
 
+def run(toy: Toy, *stages: str) -> list[str]:
+    """Have DVC run stages one by one; their lines, and DVC's of each."""
+    lines: list[str] = []
+    for name in stages:
+        repro(toy.folder, name, environment(1), lines.append)
+    return lines
+
+
 @pytest.mark.slow
-def test_one_command_runs_what_a_stage_needs(toy: Toy) -> None:
-    """As `sling fit` calls it: the stages' lines, and the name of the one that failed."""
+def test_what_is_stale_is_run_with_its_lines_and_a_failure_says_why(toy: Toy) -> None:
     graph = stale(toy.folder, ["two"])
     assert {*graph} == {"one", "two"} and {*graph.edges} == {("one", "two")}
-    assert (graph.nodes["one"]["gpu"], graph.nodes["two"]["gpu"]) == (False, True)
+    assert run(toy, "one", "two") == ["Running stage 'one':", "Running stage 'two':", "line"]
     (toy.folder / "bad").touch()
-    lines: list[str] = []
-    with pytest.raises(StageFailed, match=r"^three: said nothing \(exit status 1\)$"):
-        repro(toy.folder, "three", lines.append)
-    assert lines == [*(f"Running stage '{name}':" for name in ("one", "two")), "line"] + [
-        "Running stage 'three':"
-    ]
+    with pytest.raises(UserError, match=r"^said nothing \(exit status 1\)$"):
+        run(toy, "three")
     assert {*stale(toy.folder)} == {"three", "other"}
 
 
 @pytest.mark.slow
 def test_a_lock_that_was_cut_off_is_one_line_and_gits_brings_back_what_is_done(toy: Toy) -> None:
     lock = toy.folder / "dvc.lock"
-    repro(toy.folder, "one", lambda line: None)
+    run(toy, "one")
     for command in ("git add -A", "git -c user.name=a -c user.email=a@b commit -qm one"):
         subprocess.run(command.split(), cwd=toy.folder, check=True)
-    repro(toy.folder, "three", lambda line: None)
+    run(toy, "two", "three")
     whole = lock.read_text()
     lock.write_text(whole[:10])
-    for run in (lambda: stale(toy.folder), lambda: repro(toy.folder, "three", lambda line: None)):
+    for what in (stale, lambda folder: repro(folder, "three", environment(1), print)):
         with pytest.raises(UserError, match="dvc.lock was cut off .* `git checkout dvc.lock`"):
-            run()
+            what(toy.folder)
     subprocess.run(["git", "checkout", "-q", "dvc.lock"], cwd=toy.folder, check=True)
     assert {*stale(toy.folder)} == {"two", "three", "other"}
-    output = repro(toy.folder, "three", lambda line: None)
+    output = run(toy, "two", "three")
     assert sum("is cached - skipping run" in line for line in output) == 2
     assert lock.read_text() == whole and toy.read("runs") == "1"

@@ -82,7 +82,8 @@ def test_on_simulated_launches_it_hits_without_a_map(toy_map, settings) -> None:
         launched.append(len(draws))
         return toy.launch(draws)
 
-    source = SimulatedLandings(counting, toy_map.surface)
+    setup = SimpleNamespace(draw_y=toy.DRAW_Y, draw_z=toy.DRAW_Z, max_force=15.0)
+    source = SimulatedLandings(counting, setup)
     trained = train(source, settings)
     steps, iterations = [settings.envs] * settings.steps, settings.iterations
     assert launched == [*steps, 256] * iterations

@@ -55,7 +55,7 @@ def joints(topic: str, names: list[str], positions: np.ndarray) -> Topic:
 
 
 def picture(topic: str, encoding: str, frame: str, width: int = 4, height: int = 2) -> Topic:
-    size = {"rgb8": 3, "bayer_rggb8": 1, "16UC1": 2, "mono16": 2}[encoding]
+    size = {"rgb8": 3, "bayer_rggb8": 1, "16UC1": 2, "mono8": 1}[encoding]
     fields = {"height": height, "width": width, "step": size * width, "encoding": encoding}
     messages = [
         {**head(k, frame), **fields, "data": [0] * (size * width * height)} for k in range(3)

@@ -69,19 +69,6 @@ def test_pinholes(model, distortion) -> None:
     assert_rays_lead_back(result)
 
 
-@pytest.mark.parametrize("model", ["equidistant", "fisheye", "kannala_brandt"])
-def test_fisheyes(model) -> None:
-    k = [0.02, -0.01, 0.003, -0.001]
-    result = camera(info(distortion=k, model=model))
-    away = np.hypot(POINTS[:, 0], POINTS[:, 1])
-    angle = np.arctan2(away, POINTS[:, 2])
-    radius = angle * (1 + sum(c * angle ** (2 * i) for i, c in enumerate(k, 1)))
-    x, y = (POINTS[:, :2] * (radius / away)[:, None]).T
-    expected = np.stack([60 * x + 31.5, 62 * y + 23.5], axis=1)
-    np.testing.assert_allclose(result.project(POINTS), expected, atol=1e-9)
-    assert_rays_lead_back(result)
-
-
 def assert_rays_lead_back(model: Camera) -> None:
     points = model.rays().reshape(-1, 3) * np.linspace(0.5, 2, 64 * 48)[:, None]
     u, v = np.meshgrid(np.arange(64), np.arange(48))
@@ -123,8 +110,7 @@ def test_rectified_images_have_the_camera_p() -> None:
     [
         (info(np.zeros((3, 3))), (64, 48), "not calibrated"),
         (info(np.full((3, 3), np.nan)), (64, 48), "not calibrated"),
-        (info(distortion=[0.1] * 4, model="fisheye62"), (64, 48), "model 'fisheye62'"),
-        (info(distortion=[0.1] * 5, model="equidistant"), (64, 48), "with 5 coefficients"),
+        (info(distortion=[0.1] * 4, model="equidistant"), (64, 48), "model 'equidistant'.*rectif"),
         (info(distortion=[0.1] * 6), (64, 48), "with 6 coefficients"),
         (
             info(),

@@ -73,7 +73,7 @@ def test_lost_and_rare_messages_are_said(checked) -> None:
 @pytest.mark.fires("stamps")
 def test_bursts_and_held_values_are_said(checked) -> None:
     wrench, pose = checked.pull.recording.wrench, checked.pull.recording.pose
-    bursts = replace(wrench, bursts=Bursts(16, 16e6, True, 3e5))
+    bursts = replace(wrench, bursts=Bursts(16, 16e6, 3e5))
     assert "stamps" in abouts(of_topics(with_recording(checked, wrench=bursts)))
     held = replace(pose, hold=0.033)
     assert "stamps" in abouts(of_topics(with_recording(checked, pose=held)))

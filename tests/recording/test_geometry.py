@@ -18,6 +18,7 @@ SETUP = SimpleNamespace(base_to_fork=None, camera_to_fork=None, tip_link=None, f
 TURN = Rotation.from_euler("z", 30, degrees=True)
 JOINED = {("fork", "base"): [0, -1, 0], ("base", "optical"): [1, 0, 0]}
 ON_HAND = {("hand_tcp", "ft"): [0, 0, -0.1], ("flange", "hand_tcp"): [0, 0, 0.2]}
+POINTED = {**ON_HAND, ("ft", "pointed"): [0, 0, 0.2]}
 
 
 def recording(joins: dict, wrench: str = "ft", pose: str = "base", depth: str = "optical"):
@@ -37,13 +38,26 @@ def recording(joins: dict, wrench: str = "ft", pose: str = "base", depth: str = 
     )
 
 
-def test_a_sensor_on_the_hand() -> None:
-    geometry = geometry_of(recording({**JOINED, **ON_HAND}), SETUP)
-    assert not geometry.sensor_is_fixed and "hand_tcp" in geometry.sources["wrench"]
-    np.testing.assert_allclose(geometry.sensor.apply([0, 0, 0.1]), [0, 0, 0], atol=1e-12)
-    np.testing.assert_allclose(
-        geometry.camera.translation, [np.cos(np.pi / 6), -0.5, 0], atol=1e-12
-    )
+@pytest.mark.parametrize(
+    ("joins", "wrench", "tip", "source"),
+    [
+        (ON_HAND, "ft", None, "ft on hand_tcp"),
+        (POINTED, "ft", "pointed", "ft on pointed"),  # whatever else sounds like a tool
+        (POINTED, "ft", "optical", "ft on hand_tcp"),  # where the sensor does not sit
+        ({}, "base", None, "fixed frame base"),
+    ],
+)
+def test_where_the_sensor_sits(joins, wrench, tip, source) -> None:
+    setup = SimpleNamespace(**(vars(SETUP) | {"tip_link": tip}))
+    geometry = geometry_of(recording({**JOINED, **joins}, wrench=wrench), setup)
+    assert source in geometry.sources["wrench"]
+    assert geometry.sensor_is_fixed == (wrench == "base")
+    if tip is None and joins:
+        np.testing.assert_allclose(geometry.sensor.apply([0, 0, 0.1]), [0, 0, 0], atol=1e-12)
+    if wrench == "base":
+        np.testing.assert_allclose(geometry.sensor.rotation.as_matrix(), TURN.as_matrix())
+    camera = [np.cos(np.pi / 6), -0.5, 0]
+    np.testing.assert_allclose(geometry.camera.translation, camera, atol=1e-12)
 
 
 def test_a_depth_camera_of_its_own() -> None:
@@ -52,21 +66,6 @@ def test_a_depth_camera_of_its_own() -> None:
     np.testing.assert_allclose(geometry.color.translation, [-0.015, 0, 0])
     registered = geometry_of(recording({**JOINED, **ON_HAND}), SETUP).camera
     np.testing.assert_allclose(geometry.camera.apply([0, 0, 1]), registered.apply([-0.015, 0, 1]))
-
-
-def test_the_tip_link_is_the_frame_that_moves() -> None:
-    """Where params name it, and the sensor sits on it, whatever else sounds like a tool."""
-    joins = {**JOINED, **ON_HAND, ("ft", "pointed"): [0, 0, 0.2]}
-    setup = SimpleNamespace(base_to_fork=None, camera_to_fork=None, tip_link="pointed")
-    assert "ft on pointed" in geometry_of(recording(joins), setup).sources["wrench"]
-    elsewhere = SimpleNamespace(base_to_fork=None, camera_to_fork=None, tip_link="optical")
-    assert "ft on hand_tcp" in geometry_of(recording(joins), elsewhere).sources["wrench"]
-
-
-def test_a_wrench_in_the_base() -> None:
-    geometry = geometry_of(recording(JOINED, wrench="base"), SETUP)
-    assert geometry.sensor_is_fixed
-    np.testing.assert_allclose(geometry.sensor.rotation.as_matrix(), TURN.as_matrix())
 
 
 def test_a_wrench_and_a_pose_without_frames_are_the_hands_and_the_bases() -> None:

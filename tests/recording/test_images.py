@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from sling2sim2real.recording.images import (
     Undecodable,
-    Unsupported,
     color,
     depth,
     is_depth,
@@ -43,48 +42,29 @@ def png(image: np.ndarray) -> bytes:
     return cv2.imencode(".png", image)[1].tobytes()
 
 
-@st.composite
-def arrays(draw, kind, channels: int = 1):
-    height, width = draw(st.integers(1, 9)), draw(st.integers(1, 9))
-    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    shape = (height, width, channels) if channels > 1 else (height, width)
-    if np.issubdtype(kind, np.floating):
-        return random.uniform(0.1, 5, shape).astype(kind)
-    return random.integers(0, np.iinfo(kind).max + 1, shape).astype(kind)
-
-
-@given(arrays(np.uint8, 3), st.integers(0, 7))
-def test_raw_colors(bgr, padding) -> None:
-    alpha, rgb = np.full_like(bgr[..., :1], 7), bgr[..., ::-1]
-    grey = np.repeat(bgr[..., :1], 3, axis=2)
+@pytest.mark.parametrize("padding", [0, 7])
+def test_raw_pictures(padding) -> None:
+    alpha, grey = np.full_like(BGR[..., :1], 7), np.repeat(BGR[..., :1], 3, axis=2)
     for encoding, pixels, wanted in (
-        ("bgr8", bgr, bgr),
-        ("8UC3", bgr, bgr),
-        ("rgb8", rgb, bgr),
-        ("bgra8", np.concatenate([bgr, alpha], axis=-1), bgr),
-        ("rgba8", np.concatenate([rgb, alpha], axis=-1), bgr),
-        ("mono8", bgr[..., 0], grey),
+        ("bgr8", BGR, BGR),
+        ("rgb8", BGR[..., ::-1], BGR),
+        ("bgra8", np.concatenate([BGR, alpha], axis=-1), BGR),
+        ("rgba8", np.concatenate([BGR[..., ::-1], alpha], axis=-1), BGR),
+        ("mono8", BGR[..., 0], grey),
     ):
         np.testing.assert_array_equal(color(raw(encoding, pixels, padding)), wanted)
-
-
-@given(arrays(np.uint16), arrays(np.float32), st.integers(0, 7), st.booleans())
-def test_raw_depth_and_sixteen_grey_bits(pixels, metres, padding, swapped) -> None:
-    millimetres = depth(raw("16UC1", pixels, padding, swapped))
-    np.testing.assert_allclose(millimetres, pixels / 1000, rtol=1e-6)
-    grey = np.repeat((pixels // 256).astype(np.uint8)[..., None], 3, axis=2)
-    np.testing.assert_array_equal(color(raw("mono16", pixels, padding, swapped)), grey)
-    np.testing.assert_array_equal(depth(raw("32FC1", metres, padding, swapped)), metres)
-    np.testing.assert_allclose(depth(raw("64FC1", metres.astype(float), padding)), metres)
+    for swapped in (False, True):
+        millimetres = depth(raw("16UC1", MILLIMETRES, padding, swapped))
+        np.testing.assert_allclose(millimetres, MILLIMETRES / 1000, rtol=1e-6)
+        np.testing.assert_array_equal(depth(raw("32FC1", DEPTH, padding, swapped)), DEPTH)
 
 
 def test_unknown_depth_is_zero() -> None:
-    unknown, signed = DEPTH.copy(), MILLIMETRES.astype(np.int16)
-    unknown[0], signed[0] = [np.nan, np.inf, -np.inf, -1, 0], -1
-    for picture in (raw("32FC1", unknown), raw("16SC1", signed)):
-        result = depth(picture)
-        assert not result[0].any() and is_depth(picture)
-        np.testing.assert_allclose(result[1:], DEPTH[1:], atol=6e-4)
+    unknown = DEPTH.copy()
+    unknown[0] = [np.nan, np.inf, -np.inf, -1, 0]
+    result = depth(raw("32FC1", unknown))
+    assert not result[0].any()
+    np.testing.assert_array_equal(result[1:], DEPTH[1:])
 
 
 @pytest.mark.parametrize("kind", [".png", ".jpg", ".webp", ".tiff", ".bmp", ".jp2", ".avif"])
@@ -109,7 +89,6 @@ def test_packed_colors(kind) -> None:
         packed("16UC1; png compressed", png(MILLIMETRES)),
         packed("png", png(MILLIMETRES)),
         packed("tiff", cv2.imencode(".tiff", MILLIMETRES)[1].tobytes()),
-        packed("32FC1", cv2.imencode(".tiff", MILLIMETRES / np.float32(1000))[1].tobytes()),
     ],
 )
 def test_packed_depths(picture) -> None:
@@ -137,22 +116,19 @@ def test_quantised_depth_as_image_transport_writes_it() -> None:
 @given(st.integers(0, 2**32 - 1))
 def test_mutated_pictures_are_pictures_or_undecodable(seed) -> None:
     random = np.random.default_rng(seed)
-    frame = np.full((24, 32), 900, np.uint16)
-    jpeg = cv2.imencode(".jpg", np.full((24, 32, 3), 90, np.uint8))[1].tobytes()
+    packed_depth = bytes(12) + png(np.full((24, 32), 900, np.uint16))
     for read, format, content in (
-        (depth, "16UC1; compressedDepth png", bytes(12) + png(frame)),
-        (depth, "32FC1; compressedDepth png", bytes(12) + png(frame)),
-        (color, "jpeg", jpeg),
+        (depth, "16UC1; compressedDepth png", packed_depth),
+        (depth, "32FC1; compressedDepth png", packed_depth),
+        (color, "jpeg", JPEG),
     ):
         data = np.frombuffer(content, np.uint8).copy()
         data[random.integers(len(data), size=2)] = random.integers(256, size=2)
         data = data[: random.integers(len(data) + 1)] if seed % 2 else data
         try:
-            result = read(Picture("", format, data))
+            assert read(Picture("", format, data)).ndim in (2, 3)
         except Undecodable as error:
             assert "\n" not in str(error)
-        else:
-            assert result.ndim in (2, 3)
 
 
 JPEG = cv2.imencode(".jpg", np.full((64, 64, 3), 90, np.uint8))[1].tobytes()
@@ -172,16 +148,9 @@ WHOLE = raw("rgb8", BGR)
         (depth, packed("png", png(BGR)), "in colour"),
         (depth, packed("16UC1; compressedDepth rvl", bytes(99)), "RVL"),
         (depth, raw("8UC1", BGR[..., 0]), "'8UC1' is not known, use 16UC1"),
-    ],
-)
-def test_what_a_whole_topic_cannot_be(read, picture, words) -> None:
-    with pytest.raises(Unsupported, match=words):
-        read(picture)
-
-
-@pytest.mark.parametrize(
-    ("read", "picture", "words"),
-    [
+        (depth, raw("16SC1", MILLIMETRES.astype(np.int16)), "'16SC1' is not known, use 16UC1"),
+        (depth, raw("64FC1", DEPTH.astype(float)), "'64FC1' is not known, use 16UC1"),
+        (color, raw("mono16", MILLIMETRES), "'mono16' is not known, use rgb8"),
         (color, packed("jpeg", b""), "damaged"),
         (color, packed("jpeg", JPEG[:-2]), "cut off"),
         (color, packed("gif", cv2.imencode(".gif", BGR)[1].tobytes()), "neither JPEG"),
@@ -197,10 +166,9 @@ def test_what_a_whole_topic_cannot_be(read, picture, words) -> None:
         (color, replace(WHOLE, height=0), "raw image of 5 x 0 pixels"),
     ],
 )
-def test_damage_is_told_from_it(read, picture, words) -> None:
-    with pytest.raises(Undecodable, match=words) as caught:
+def test_what_cannot_be_decoded_says_why(read, picture, words) -> None:
+    with pytest.raises(Undecodable, match=words):
         read(picture)
-    assert not isinstance(caught.value, Unsupported)
 
 
 @pytest.mark.parametrize("step", [0, 5])
@@ -211,7 +179,7 @@ def test_a_step_that_is_missing_or_in_pixels(step) -> None:
 
 def test_depth_is_told_from_color() -> None:
     assert is_depth(raw("16UC1", MILLIMETRES)) and is_depth(raw("32FC1", DEPTH))
-    assert not is_depth(raw("rgb8", BGR)) and not is_depth(raw("mono16", MILLIMETRES))
+    assert not is_depth(raw("rgb8", BGR))
     assert is_depth(packed("16UC1; compressedDepth", b""))
     assert not is_depth(packed("rgb8; jpeg compressed bgr8", b""))
     assert not is_depth(packed("png", png(BGR[..., 0])))

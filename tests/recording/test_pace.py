@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording import pace
 
 MS = 1_000_000
@@ -33,21 +34,17 @@ def test_bursts_are_spread_back_to_where_samples_were_taken(size, width, late, l
     stamp = end[burst] + (np.arange(len(true)) % size) * min(width, MS // 8 // size)
     retained = ~np.isin(burst, [number * (burst[-1] // 100) for number in lost])
     stamp, true, values = stamp[retained], true[retained], values[retained]
-    even, bursts = pace.without_bursts(stamp, stamp + 100_000, values)
-    assert bursts.count == size and bursts.before
+    even, bursts = pace.without_bursts("/x", stamp, stamp + 100_000, values)
+    assert bursts.count == size
     whole = slice(size, len(true) - size)
     assert np.abs(even - true)[whole].max() < MS / 2 + 1.5 * late
     assert np.all(np.diff(even) > 0)
 
 
-@pytest.mark.parametrize("tick", [3, 10, 20])
-def test_a_coarse_clock_is_spread_behind_its_ticks(tick) -> None:
+def test_a_coarse_clock_is_refused() -> None:
     true, values = samples()
-    true = true + 300_000
-    stamp = true // (tick * MS) * (tick * MS)
-    even, bursts = pace.without_bursts(stamp, true + 150_000, values)
-    assert not bursts.before and bursts.count == tick
-    assert np.abs(even - true)[tick:-tick].max() < MS
+    with pytest.raises(UserError, match="/x: its clock ticks every 10 ms only"):
+        pace.without_bursts("/x", true // (10 * MS) * (10 * MS), true + 150_000, values)
 
 
 @given(
@@ -61,14 +58,14 @@ def test_even_stamps_are_left(rate, jitter, lost, seed) -> None:
     stamp = np.arange(3000) / rate + jitter / rate * random.uniform(-1, 1, 3000)
     stamp = np.sort(np.round(1e9 * stamp[random.random(3000) >= lost]).astype(np.int64))
     values = random.normal(size=(len(stamp), 3))
-    assert pace.without_bursts(stamp, stamp, values) is None
+    assert pace.without_bursts("/x", stamp, stamp, values) is None
     assert pace.hold_of(stamp, values) is None
 
 
 def test_doubled_messages_are_no_bursts() -> None:
     true, values = samples()
     twice = np.repeat(true, 2)
-    assert pace.without_bursts(twice, twice + 1000, np.repeat(values, 2, axis=0)) is None
+    assert pace.without_bursts("/x", twice, twice + 1000, np.repeat(values, 2, axis=0)) is None
 
 
 @given(times=st.integers(2, 60), jitter=st.floats(0, 0.2), rests=st.booleans())

@@ -18,7 +18,7 @@ from sling2sim2real.recording.build import build_episodes
 from sling2sim2real.recording.files import read_container
 from sling2sim2real.recording.frames import geometry_of
 from sling2sim2real.recording.streams import read_recording, recording_of
-from validation.recordings.bag import START, blind_bag, edit, head, messages_of
+from validation.recordings.bag import START, blind_bag, edit, messages_of
 
 
 def read(path: Path, params):
@@ -67,28 +67,6 @@ def test_each_message_is_decoded_once(seen, params, monkeypatch) -> None:
     assert decoded == Counter(schema.name for schema, *_ in messages_of(seen[0]))
 
 
-def test_a_lone_wild_value_is_lost_and_a_knock_is_kept(tmp_path, params) -> None:
-    """A glitch is one message; what the hand feels lasts for several."""
-    stamps = {name: START + round(t * 1e9) for name, t in (("wild", 1.5), ("knock", 1.7))}
-
-    def force(stamp: int, message) -> None:
-        if stamp == stamps["wild"]:
-            message.wrench.force.x = 5000.0
-        if 0 <= stamp - stamps["knock"] < 8_000_000:
-            message.wrench.force.x += 60.0
-
-    def place(stamp: int, message) -> None:
-        if stamp == stamps["wild"]:
-            message.pose.position = SimpleNamespace(x=0.0, y=0.0, z=0.0)
-
-    path = blind_bag(tmp_path, change=edit(wrench=force, pose=place))
-    recording = read(path, params)
-    for stream in (recording.wrench, recording.pose):
-        assert stream.lost == 1 and stream.notes == ["lost 1 far off those around"]
-        assert stamps["wild"] not in stream.stamp
-    assert np.count_nonzero(recording.wrench.values[:, 0] > 40) == 4
-
-
 def test_a_refusal_says_what_the_file_lost(blind, tmp_path, params) -> None:
     path = tmp_path / "cut.mcap"
     path.write_bytes(blind[0].read_bytes()[:2000])
@@ -96,48 +74,21 @@ def test_a_refusal_says_what_the_file_lost(blind, tmp_path, params) -> None:
         read(path, params)
 
 
-def test_nan_doubled_and_shuffled_wrenches(tmp_path, params) -> None:
-    stamps = []
-
-    def spoil(stamp: int, message) -> None:
-        stamps.append(stamp)
-        number = len(stamps)
-        if number == 100:
-            message.wrench.force.x = float("nan")
-        elif number in (200, 201):  # swap two stamps
-            message.header = head(stamp + (2_000_000 if number == 200 else -2_000_000))
-        elif number == 301:  # the stamp of the one before
-            message.header = head(stamp - 2_000_000)
-
-    wrench = read(blind_bag(tmp_path, change=edit(wrench=spoil)), params).wrench
-    assert np.all(np.diff(wrench.stamp) > 0)
-    assert wrench.lost == 2
-    assert len(wrench.stamp) == len(stamps) - 2
-    assert np.isfinite(wrench.values).all()
-
-
 def test_poses_and_transforms_without_a_rotation(tmp_path, params) -> None:
     """Some publishers leave the quaternion at zero."""
-    poses, nowhere = [], SimpleNamespace(x=0.0, y=0.0, z=0.0, w=0.0)
+    nowhere = SimpleNamespace(x=0.0, y=0.0, z=0.0, w=0.0)
 
     def pose(stamp: int, message) -> None:
-        poses.append(stamp)
-        if len(poses) in (10, 20, 30):
+        if 0 <= stamp - START < 30_000_000:
             message.pose.orientation = nowhere
 
     def tree(stamp: int, message) -> None:
         message.transforms[0].transform.rotation = nowhere
 
     recording = read(blind_bag(tmp_path, change=edit(pose=pose, tf=tree)), params)
-    assert recording.pose.lost == 3 and len(recording.pose.stamp) == len(poses) - 3
+    assert recording.pose.lost > 3 and recording.pose.stamp[0] >= START + 30_000_000
     with pytest.raises(UserError, match="setup.base_to_fork"):
         geometry_of(recording, params.setup)
-
-    def every(stamp: int, message) -> None:
-        message.pose.orientation = nowhere
-
-    with pytest.raises(UserError, match="fewer than two readable"):
-        read(blind_bag(tmp_path, change=edit(pose=every)), params)
 
 
 def test_a_missing_topic_is_named(params, blind) -> None:
@@ -153,20 +104,3 @@ def test_a_missing_topic_is_named(params, blind) -> None:
         with pytest.raises(UserError, match=words) as caught:
             recording_of(replace(container, topics=left), params.setup)
         assert str(blind[0]) in str(caught.value) and "\n" not in str(caught.value)
-
-
-def test_files_that_are_no_recordings(tmp_path, params) -> None:
-    missing, empty, text = (tmp_path / name for name in ("missing", "empty", "text"))
-    empty.touch()
-    text.write_text("not a recording " * 100)
-    bare = tmp_path / "bare"
-    bare.write_bytes(b"\x89MCAP0\r\n")
-    for path, words in (
-        (missing, "no such file"),
-        (tmp_path, "is a folder"),
-        (empty, "is empty"),
-        (text, "not an MCAP"),
-        (bare, "no messages at all"),
-    ):
-        with pytest.raises(UserError, match=words):
-            read(path, params)

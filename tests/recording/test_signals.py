@@ -53,21 +53,26 @@ def band_alone(played: Played, params, inertia, recording=None):
     return result
 
 
-@pytest.fixture(scope="module")
-def turning() -> Played:
-    return Played(turn=0.6, mass=MASS)
-
-
-def test_a_turning_hand_asks_for_the_tool(turning, params) -> None:
+def test_a_turning_hand_asks_for_the_tool(params) -> None:
     with pytest.raises(UserError, match=r"turns by \d\d\.\d degrees .* setup.tool"):
-        signals(turning, params)
+        signals(Played(turn=0.6, mass=MASS), params)
 
 
-def test_a_turning_hand_with_its_tool_gives_the_bands_force(turning, params) -> None:
-    result = signals(turning, params, tool())
-    assert off(turning, result).max() < 0.15  # of 20 N; a kink where the band goes taut
-    assert np.median(off(turning, result)) < 0.02
-    assert result.facts.tool.mass == MASS and np.degrees(result.facts.turn) > 10
+@pytest.mark.parametrize(
+    "played, given",
+    [
+        (Played(turn=0.6, mass=MASS), tool()),
+        (Played(turn=0.6, mass=MASS, truth=Truth(sign=-1.0)), tool()),  # it feels its tool so, too
+        (Played(turn=0.6, mass=MASS, fixed=True), None),  # a wrench in the base
+        (Played(turn=0.6, mass=0.0), tool(mass=0.0)),  # a force without its tool
+    ],
+)
+def test_a_turning_hand_with_its_tool_gives_the_bands_force(params, played, given) -> None:
+    result = signals(played, params, given or tool(center=tuple(played.center_in_hand)))
+    assert off(played, result).max() < 0.15  # of 20 N; a kink where the band goes taut
+    assert np.median(off(played, result)) < 0.02
+    assert result.facts.tool.mass == played.mass and np.degrees(result.facts.turn) > 10
+    assert result.facts.flipped == (played.truth.sign < 0)
 
 
 def test_a_wrong_centre_of_mass_is_felt_where_the_hand_turns_fast(params) -> None:
@@ -85,27 +90,16 @@ def test_the_inertia_of_a_hand_that_does_not_turn(params) -> None:
     assert gone.max() < 0.15 and np.median(gone) < 0.01
 
 
-def test_a_tool_that_nobody_named_is_measured(params) -> None:
-    """Its inertia in free motion shows its mass, with which it is gone from the pull, too."""
-    played = Played(mass=MASS, truth=Truth(noise=0.005))
+@pytest.mark.parametrize(("mass", "sign"), [(MASS, 1.0), (MASS, -1.0), (-0.3, 1.0)])
+def test_a_tool_that_nobody_named_is_measured(params, mass, sign) -> None:
+    """Its inertia in free motion is taken off the pull, too, whatever its sign."""
+    played = Played(mass=mass, truth=Truth(noise=0.005, sign=sign))
     inertia = estimate_tool_inertia(pulled(played.recording(), played.geometry()), None)
-    assert inertia.mass == pytest.approx(MASS, rel=0.03)
+    assert inertia.mass == pytest.approx(sign * mass, rel=0.03)
     result = band_alone(played, params, inertia)
     assert result.facts.tool.source == "its inertia"
-    summary = signals(played, params, tool(mass=0.0), inertia=inertia)
-    given = ToolFacts(0.0, list(TOOL), "setup.tool")
-    assert summary.facts.tool == given
-
-
-def test_a_sensor_that_takes_off_too_much_or_has_the_other_sign(params) -> None:
-    """What is measured is taken off as it is measured, whatever its sign."""
-    for played in (
-        Played(mass=-0.3, truth=Truth(noise=0.005)),
-        Played(mass=MASS, truth=Truth(noise=0.005, sign=-1.0)),
-    ):
-        inertia = estimate_tool_inertia(pulled(played.recording(), played.geometry()), None)
-        assert inertia.mass == pytest.approx(played.truth.sign * played.mass, rel=0.03)
-        band_alone(played, params, inertia)
+    named = signals(played, params, tool(mass=0.0), inertia=inertia)
+    assert named.facts.tool == ToolFacts(0.0, list(TOOL), "setup.tool")
 
 
 def test_a_sensor_that_knows_the_weight_but_not_the_inertia(params) -> None:
@@ -146,23 +140,6 @@ def test_the_weight_of_a_hand_that_turns_away_is_no_drift(params) -> None:
     assert np.linalg.norm(hold) < 0.05
 
 
-def test_a_sensor_of_the_other_sign_feels_its_tool_so_too(params) -> None:
-    played = Played(turn=0.6, mass=MASS, truth=Truth(sign=-1.0))
-    result = signals(played, params, tool())
-    assert result.facts.flipped and off(played, result).max() < 0.15
-
-
-def test_a_wrench_in_the_base_of_a_hand_that_turns(params) -> None:
-    played = Played(turn=0.6, mass=MASS, fixed=True)
-    result = signals(played, params, tool(center=tuple(played.center_in_hand)))
-    assert off(played, result).max() < 0.15
-
-
-def test_a_force_without_its_tool_may_turn_with_mass_zero(params) -> None:
-    played = Played(turn=0.6, mass=0.0)
-    assert off(played, signals(played, params, tool(mass=0.0))).max() < 0.15
-
-
 def test_gaps_are_said_and_long_ones_refused(params) -> None:
     played = Played()
     for length, topic in ((0.2, "wrench"), (0.2, "pose"), (0.4, "wrench"), (0.4, "pose")):
@@ -198,13 +175,13 @@ def test_irregular_stamps_give_the_same_velocity(params) -> None:
     np.testing.assert_allclose(jittered.velocity, even.velocity, atol=0.03)
 
 
-@pytest.mark.parametrize("topic", ["wrench", "pose"])
-def test_a_stamp_of_another_century_is_refused(topic, params) -> None:
+def test_a_stamp_of_another_century_is_refused(params) -> None:
     """And not filled in at 1 kHz."""
-    recording = Played().recording()
-    whole = getattr(recording, topic)
-    stamp = whole.stamp.copy()
-    stamp[-1] += 3 * 10**18
-    setattr(recording, topic, replace(whole, stamp=stamp))
-    with pytest.raises(UserError, match=f"{whole.topic} has .* missing nearly all the time"):
-        signals(Played(), params, recording=recording)
+    for topic in ("wrench", "pose"):
+        recording = Played().recording()
+        whole = getattr(recording, topic)
+        stamp = whole.stamp.copy()
+        stamp[-1] += 3 * 10**18
+        setattr(recording, topic, replace(whole, stamp=stamp))
+        with pytest.raises(UserError, match=f"{whole.topic} has .* missing nearly all the time"):
+            signals(Played(), params, recording=recording)

@@ -134,9 +134,6 @@ def template(tmp_path_factory) -> Path:
     folder = data / "policies" / PAIR
     chart = write_stored(folder)
     chart.save(folder / "map.parquet")
-    pd.DataFrame({"iteration": [1, 2], "mean_error": [0.3, 0.004]}).to_parquet(
-        folder / "training.parquet"
-    )
     launches().to_parquet(data / "trials" / f"{PAIR}.parquet")
     return root
 

@@ -1,23 +1,17 @@
 """Pictures of the report, read back from the objects that were drawn."""
 
-from dataclasses import replace
-from types import SimpleNamespace
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from pipeline.report.data import with_errors
 from pipeline.report.figures import landings, search
-from pipeline.report.figures.simulation import pull
 from sling2sim2real.drawing import canvas
 from sling2sim2real.drawing.styles import styles
 from sling2sim2real.identification.results.ranges import searched
-from tests.report.conftest import BAND, METHOD, episode, launches
-from tests.report.toy_simulation import toy_landscape, toy_replay
+from tests.report.conftest import BAND, METHOD, launches
+from tests.report.toy_simulation import toy_landscape
 
 
 @pytest.fixture
@@ -88,47 +82,6 @@ def test_what_is_far_off_lies_on_a_logarithmic_axis_that_says_so(retained) -> No
         assert retained[-1].axes[0].get_xlabel() == f"landing − target [cm]{words}"
 
 
-STILL = episode()
-DEPTH = np.clip(STILL.time / 20, 0, 0.4)
-RECORDED = replace(STILL, position=np.stack([0 * DEPTH, -0.8 * DEPTH, -0.6 * DEPTH], 1))
-HELD = (STILL.time >= 1) & (STILL.time <= 8 - 2 * STILL.sample_period)
-SIZE = np.hypot(STILL.time, np.sin(STILL.time))
-
-
-def test_force_over_draw_and_what_is_left_over_time(retained) -> None:
-    run = SimpleNamespace(episodes={BAND: RECORDED})
-    played = toy_replay(run, SimpleNamespace(band=BAND))
-    pull("", {BAND: RECORDED}, {BAND: {METHOD: played}}, styles([METHOD]))
-    top, middle, bottom = retained[0].axes
-    measured, simulated = top.lines
-    np.testing.assert_allclose(measured.get_xdata(), DEPTH[HELD])  # from grasp to release
-    np.testing.assert_allclose(measured.get_ydata(), SIZE[HELD])
-    np.testing.assert_allclose(simulated.get_ydata(), 0.9 * SIZE[HELD])
-    left = 0.1 * np.linalg.norm(RECORDED.force, axis=1)
-    np.testing.assert_allclose(middle.lines[0].get_ydata(), left)
-    np.testing.assert_allclose(bottom.lines[0].get_ydata(), 1.0)  # cm
-
-
-def test_a_recording_alone_is_drawn_too(retained) -> None:
-    pull("", {BAND: RECORDED}, {}, {})
-    assert len(retained[0].axes[0].lines) == 1
-    assert [text.get_text() for text in retained[0].legends[0].get_texts()] == ["measured"]
-
-
-def test_convergence_draws_the_printed_loss_of_the_best_so_far(retained, result) -> None:
-    """Of a fit that keeps one row, that row stands where its rollouts end."""
-    fitted = replace(result, theta=result.theta | {"rollouts": 60})
-    search.convergence("", {BAND: {METHOD: result, "de": fitted}}, styles([METHOD, "de"]))
-    (ax,) = retained[0].axes
-    steps, end, other, _ = ax.lines
-    assert steps.get_xdata().tolist() == [1, 2, 3, 4, 5]
-    assert other.get_xdata().tolist() == [1, 2, 3, 4, 60]
-    for line in (steps, other):
-        np.testing.assert_allclose(line.get_ydata(), [3, 3, 2, 2, 1.25])
-    assert end.get_xydata().tolist() == [[5, 1.25]]
-    assert steps.get_linestyle() != other.get_linestyle()
-
-
 def test_the_search_is_drawn_in_physical_values(retained, result, params) -> None:
     """Failures are crosses, a region is an ellipse along its covariance, its path starts there."""
     sigma = 0.01 * np.eye(5)
@@ -153,15 +106,6 @@ def test_the_search_is_drawn_in_physical_values(retained, result, params) -> Non
     assert np.corrcoef(places)[0, 1] == pytest.approx(0.9, abs=0.02)
 
 
-def test_training_is_drawn_in_centimetres(retained, result) -> None:
-    curves = {BAND: {METHOD: result.training, "de": result.training}}
-    search.training("", curves, styles([METHOD, "de"]))
-    first, second, _ = retained[0].axes[0].lines
-    np.testing.assert_array_equal(first.get_xdata(), [1, 2])
-    np.testing.assert_allclose(first.get_ydata(), [30, 0.4])
-    assert first.get_linestyle() != second.get_linestyle()
-
-
 def test_flights_lie_where_they_flew_and_were_expected(retained, params) -> None:
     """A launch without air from 0.5 m above the floor, at 45 degrees and 3 m/s."""
     flown = {"flight_y": [[0.0, 1.0, 2.0]] * 4, "flight_z": [[0.0, 0.4, -0.5]] * 4}
@@ -178,22 +122,3 @@ def test_flights_lie_where_they_flew_and_were_expected(retained, params) -> None
     speed, height = 3 / np.sqrt(2), params.setup.fork_height
     time = (speed + np.sqrt(speed**2 + 2 * 9.81 * height)) / 9.81
     np.testing.assert_allclose(far, [speed * time, -height], rtol=1e-3)
-
-
-def rows(total, geom, force=0.0, work=0.0) -> pd.DataFrame:
-    columns = np.broadcast_arrays(total, geom, force, work)
-    return pd.DataFrame(dict(zip(("total", "geom", "force", "work"), columns, strict=True)))
-
-
-def test_the_best_by_another_loss_may_print_worse() -> None:
-    history = rows([np.inf, 3, 5, 2, 2, 1], [np.nan, 1, 0.5, 4, 9, 2], force=0.5, work=0.25)
-    best = search.best_so_far(history)
-    assert best.tolist() == [0, 1, 1, 3, 3, 5]  # among equals the first
-    printed = search.printed(history)[best]
-    np.testing.assert_allclose(printed, [np.inf, 1.75, 1.75, 4.75, 4.75, 2.75])
-
-
-@given(st.lists(st.floats(0, 9) | st.just(np.inf), min_size=1, max_size=40))
-def test_the_methods_own_best_never_rises(total: list[float]) -> None:
-    best = np.array(total)[search.best_so_far(rows(total, 0.0))]
-    np.testing.assert_array_equal(best, np.minimum.accumulate(total))

@@ -9,9 +9,8 @@ from rig.recorder.interaction import Interaction
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.recording.build import build_episodes
 from sling2sim2real.simulator.model import ClampedBand
-from tools.closure import stages
+from tests.project import STAGES
 
-STAGES = stages()
 WORLD = {"record", "trials", "floor"}
 SHOWN = ("data/trials", "data/floor")  # what came of launches on the rig
 JUDGES = {"trials", "report", "card"}

@@ -284,7 +284,7 @@ def test_what_a_method_may_ask_for() -> None:
     rubber |= {"fixed": ALL_FIXED | {"softening": 0.0}}  # the rest of what the law adds is left
     method = checked(changed(("methods", "de"), base | rubber)).methods["de"]
     assert len(method.fixed) == 6
-    assert method.bounds["flow"] == (0.1, 0.9) and method.bounds["mooney_share"] == (-0.3, 0.9)
+    assert method.bounds["flow"] == (0.1, 0.9) and method.bounds["mooney_share"] == (-1.0, 0.9)
     assert {*method.bounds} == {*LAWS["rubber"]} - {"softening"}
 
 

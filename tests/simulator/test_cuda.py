@@ -1,20 +1,14 @@
 """One source for both: on a GPU the simulator does what it does on the CPU."""
 
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 import pytest
 
-from pipeline.params import load
 from sling2sim2real.base.machine import gpus
-from sling2sim2real.identification.objective.box import SearchBox
-from sling2sim2real.identification.objective.evaluate import Evaluator
-from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.simulator import interact, launch
 from sling2sim2real.simulator.model import LaunchHistory
 from sling2sim2real.simulator.parameters import Parameters
-from tests.project import DEFAULTS
 from tests.simulator.bands import neo, random_draws, random_thetas
 
 pytestmark = pytest.mark.skipif(not gpus(), reason="no CUDA device on this machine")
@@ -65,40 +59,6 @@ def test_what_stays_on_the_gpu_is_what_is_fetched(strong_grip, episode):
     assert not isinstance(stays.center_line, np.ndarray)
     assert np.array_equal(stays.center_line.numpy(), fetched.center_line)
     assert np.array_equal(stays.force.numpy(), fetched.force)
-
-
-@pytest.mark.skipif(len(gpus()) < 2, reason="fewer than two GPUs on this machine")
-def test_gpus_share_a_batch_and_change_nothing(
-    strong_grip, sling, episode, monkeypatch, launch_setup
-):
-    """Rollouts with their loss in shares of 34 and 33, and launches."""
-    time = episode.cloud_time
-    clouds = [np.random.default_rng(frame).normal(0, 0.1, (200, 3)) for frame in range(len(time))]
-    seen = replace(episode, clouds=[cloud.astype(np.float32) for cloud in clouds])
-    weights = {"geom": 1.0, "force": 1.0, "work": 1.0}
-    shape = {"radius": sling.radius, "rest_edges": sling.edge_lengths}
-    loss = EpisodeLoss(seen, **shape, weights=weights, cutoff=30.0)
-    space = SearchBox.of(load(DEFAULTS).parameters)
-    unit = np.random.default_rng(8).random((67, space.dimension))
-    teams = ("cuda:0",), ("cuda:1",), ("cuda:0", "cuda:1")
-    first, *others = (
-        Evaluator(seen, strong_grip, loss, space, devices=team)(unit) for team in teams
-    )
-    for other in others:
-        assert other.failure == first.failure
-        np.testing.assert_array_equal(other.total, first.total)
-        for name, values in first.terms.items():
-            np.testing.assert_array_equal(other.terms[name], values)
-
-    module = import_module("sling2sim2real.simulator.launch")
-    monkeypatch.setattr(module, "FEWEST_LAUNCHES_A_DEVICE", 1)
-    thetas = space.parameters(space.to_physical(unit))
-    first, *others = (
-        launch(sling, launch_setup, thetas, [-0.4, -0.2], device=team) for team in teams
-    )
-    for other in others:
-        assert other.failure == first.failure
-        np.testing.assert_array_equal(other.landing_y, first.landing_y)
 
 
 def test_result_depends_on_no_neighbour_on_the_gpu(strong_grip, episode):

@@ -4,12 +4,11 @@ tests/validation/simulator/test_limits.py holds their steps, flight and energy.
 """
 
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 import pytest
 
-from sling2sim2real.simulator import launch, solver
+from sling2sim2real.simulator import launch
 from sling2sim2real.simulator.launch import ballistic_landing
 from sling2sim2real.simulator.model import GRAVITY
 from tests.simulator.bands import DRAW, THETA, neo
@@ -30,33 +29,6 @@ def test_damping_takes_speed_and_the_projectile_separates_before_the_fork(sling,
     assert shots.failure == [None] * 3 and np.all(np.diff(shots.speed) < 0)
     # the band goes slack about 0.2 m before the fork
     assert np.all((-0.3 < shots.separation_y) & (shots.separation_y < -0.1))
-
-
-def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch, launch_setup):
-    """Small batches stay on the first, and each launch gets its own theta."""
-    rng = np.random.default_rng(6)
-    draws = np.column_stack([rng.uniform(-0.45, -0.1, 9), rng.uniform(-0.3, -0.1, 9)])
-    thetas = np.column_stack([10 ** rng.uniform(5, 6.2, 9), np.tile(THETA[1:], (9, 1))])
-    single, requested = launch(sling, launch_setup, neo(thetas), draws), []
-
-    def run(sling, schedule, slings, options):
-        requested.append((options.device, len(slings)))
-        return solver.run(sling, schedule, slings, options=replace(options, device="cpu"))
-
-    module = import_module("sling2sim2real.simulator.launch")
-    monkeypatch.setattr(module, "run", run)
-    for share, expected in (
-        (5, {("a", 9)}),
-        (4, {("a", 5), ("b", 4)}),
-        (1, {("a", 3), ("b", 3), ("c", 3)}),
-    ):
-        monkeypatch.setattr(module, "FEWEST_LAUNCHES_A_DEVICE", share)
-        requested.clear()
-        several = launch(sling, launch_setup, neo(thetas), draws, device=("a", "b", "c"))
-        assert set(requested) == expected and several.failure == single.failure
-        for name in ("landing_y", "speed", "angle", "hold_force", "separation_time"):
-            np.testing.assert_array_equal(getattr(several, name), getattr(single, name))
-    assert 0 < sum(reason is None for reason in single.failure) < 9
 
 
 def test_failures_have_names(sling, launch_setup):

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from sling2sim2real.base.code import ROOT
+from pipeline.layout import ROOT
 from validation import real_launches
 from validation.real_launches import FILE, SIZES, Slingshot
 

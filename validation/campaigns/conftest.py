@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
+from pipeline.layout import ROOT
 from pipeline.params import Params, load
-from sling2sim2real.base.code import ROOT
 from sling2sim2real.base.files import write_json
 from validation.environment import environment
 from validation.projects import DEFAULTS

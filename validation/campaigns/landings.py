@@ -216,14 +216,15 @@ WORDS = {
 
 
 def table(contents: dict[str, dict]) -> list[str]:
-    """The table of docs/identification.md, of the reports of all sets."""
+    """The table of docs/identification.md, of the reports of some sets."""
     rows = [
         "| rubbers | recorded by | recordings | size of the bias, mean (worst) | inside,"
         " mean of bands (least band; least recording) | width |",
         "|---|---|---:|---:|---:|---:|",
     ]
     percent = "{:.0f} %".format
-    for name, words in WORDS.items():
+    shown = {name: words for name, words in WORDS.items() if name in contents}
+    for name, words in shown.items():
         for kind, how in ROWS.items():
             if kind not in (of := contents[name]["figures"]):
                 continue
@@ -239,7 +240,7 @@ def table(contents: dict[str, dict]) -> list[str]:
                 )
                 cells += [f"{mean} ({band}; {recording})", f"{100 * means['median_width']:.1f} %"]
             rows.append(re.sub(r"-(?=\d)", "−", row(*cells)))
-    for name, words in WORDS.items():
+    for name, words in shown.items():
         there, whole = contents[name]["jobs"]
         if there < whole:
             rows += ["", f"Of {words} {there} of {whole} identifications have run."]

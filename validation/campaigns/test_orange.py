@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.layout import ROOT
 from sling2sim2real import Identification, launch
-from sling2sim2real.base.code import ROOT
 from validation.orange import ABOUT, NAME, landings
 from validation.projects import SLING, ProjectCopy
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from sling2sim2real.base.code import ROOT
+from pipeline.layout import ROOT
 from validation.pages import CODE_BLOCK
 from validation.projects import ProjectCopy, copy_project
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from ruamel.yaml import YAML
 
+from pipeline.layout import ROOT
 from pipeline.params import Params
-from sling2sim2real.base.code import ROOT
 from sling2sim2real.identification.search import rollouts_of
+from sling2sim2real.settings.identification import POSTERIOR
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 from validation.campaigns.runner import PAPER
 
@@ -43,8 +44,11 @@ def with_variants(params: Params) -> Params:
 
 
 def with_preset(params: Params, method: str, preset: str | None) -> Params:
-    """params.yaml with a preset's keys of `optimizer`, as a method has them."""
-    if preset is None:
+    """params.yaml with a preset's keys of `optimizer`, as a method has them.
+
+    The posterior steps until it has converged, whatever its exploration: it has no such budget.
+    """
+    if preset is None or params.methods[method].search == POSTERIOR:
         return params
     text = (PRESETS / f"{preset}.yaml").read_text(encoding="utf-8")
     changes = YAML(typ="safe").load(text)["optimizer"]

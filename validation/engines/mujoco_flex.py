@@ -12,9 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.exporting.mesh import Tube, hand_path
+from sling2sim2real.exporting.mesh import Tube
+from sling2sim2real.simulator.interaction import blend
 from sling2sim2real.simulator.launch import ballistic_landing
 from sling2sim2real.simulator.model import GRAVITY, ClampedBand, LaunchSetup
 
@@ -222,3 +224,14 @@ def _mujoco():
     except ImportError as error:
         raise UserError("mujoco is not installed: make setup") from error
     return mujoco
+
+
+def hand_path(episode, times: np.ndarray, grasp: np.ndarray) -> np.ndarray:
+    """Where the held section is at `times` (S,): on the hand's path, after a blend from `grasp`.
+
+    Returns:
+        Its centre [m], shape (S, 3), as sling.interaction leads it.
+    """
+    inside = np.clip(times, episode.time[0], episode.time[-1])
+    path = CubicSpline(episode.time, episode.position, axis=0)(inside)
+    return path + blend(times, episode)[:, None] * (grasp - path[0])

@@ -18,7 +18,6 @@ from sling2sim2real.drawing.canvas import key
 COLUMNS, WIDTH = 2, 5.6  # panels in a row; inches
 ENTRY = 2.6  # inches of an entry of a key
 LETTERS = 11.5  # of a title, an inch
-DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))  # of methods, one after another
 
 
 def panels(

@@ -1,21 +1,19 @@
-"""How searches and policies converged, and figure 2 of the paper on the loss itself."""
+"""Figure 2 of the paper: how its search goes, on the loss itself."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import cycle
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from pipeline.report.data import PRINTED, Result, Run
-from pipeline.report.figures.panels import DASHES, entitle, explain, panels
-from sling2sim2real.drawing.canvas import few_ticks, key, log_y, mark, picture
-from sling2sim2real.drawing.styles import INK, Styles
+from pipeline.report.data import Result, Run
+from pipeline.report.figures.panels import entitle
+from sling2sim2real.drawing.canvas import few_ticks, key, mark, picture
+from sling2sim2real.drawing.styles import INK
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.objective.loss import EpisodeLoss
@@ -28,79 +26,9 @@ AXES = "youngs_modulus", "elasticity_damping"  # two dominant factors, the paper
 SIZE = 17  # rollouts along each axis
 AROUND = 0.04  # of the unit cube, about what is shown
 PATH, STAR = "#e4003a", "#ffd23f"
-NEAR = 0.5  # above the least loss, up to which a picture reaches at least
 SHOWN = 0.6  # share of the grid that the colour scale tells apart
 LEVELS = 12
 FRAMED = dict.fromkeys(["axes.spines.top", "axes.spines.right"], True) | {"axes.grid": False}
-
-
-def printed(evaluations: pd.DataFrame) -> np.ndarray:
-    """The paper's printed loss of every row, shape (N,), whatever the method minimised."""
-    total = evaluations[list(PRINTED)].sum(axis=1, skipna=False).to_numpy(float)
-    return np.where(np.isfinite(total), total, np.inf)
-
-
-def best_so_far(evaluations: pd.DataFrame) -> np.ndarray:
-    """Row of the least total of the method's own loss among the rows so far, shape (N,)."""
-    total = evaluations.total.to_numpy(float)
-    total = np.where(np.isfinite(total), total, np.inf)
-    better = np.append(True, total[1:] < np.minimum.accumulate(total)[:-1])
-    return np.maximum.accumulate(np.where(better, np.arange(len(total)), 0))
-
-
-@picture()
-def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> Figure:
-    """The printed loss of every method's best so far, against rollouts.
-
-    Args:
-        searches: By band and method. A method that minimises another loss may rise.
-    """
-    title = "Lower is a better fit, further left a cheaper one: the paper's loss so far"
-    figure, axes_of = panels(searches, title, 2.4, sharex=True)
-    methods = dict.fromkeys(method for of_band in searches.values() for method in of_band)
-    dashes = dict(zip(methods, cycle(DASHES)))
-    for band, ax in axes_of.items():
-        ends = []
-        for method, result in searches[band].items():
-            best = printed(result.evaluations)[best_so_far(result.evaluations)]
-            best = np.where(np.isfinite(best), best, np.nan)
-            spent = np.arange(1, len(best) + 1)
-            spent[-1] = max(spent[-1], result.rollouts)  # a fit keeps one row of all that it spends
-            style = {"color": styles[method].color, "ls": dashes[method], "lw": 1.3}
-            ax.plot(spent, best, drawstyle="steps-post", **style)
-            ax.plot(spent[-1], best[-1], "o", ms=4, color=style["color"])
-            ends.append(best[-1])
-        least = np.nanmin(ends)
-        ax.set_ylim(0.97 * least, max((1 + NEAR) * least, 1.03 * np.nanmax(ends)))
-        ax.set_xlabel("rollouts")
-        log_y(ax)
-    next(iter(axes_of.values())).set_ylabel("geom + force + work")
-    entries = [(styles[m].name, mark(color=styles[m].color, ls=dashes[m])) for m in methods]
-    explain(figure, entries)
-    return figure
-
-
-@picture()
-def training(curves: dict[str, dict[str, pd.DataFrame]], styles: Styles) -> Figure:
-    """Error of the deterministic policy by iteration of PPO, in its own simulator.
-
-    Args:
-        curves: training.parquet of each band and method.
-    """
-    title = "A policy has converged where its curve stays below the line at 1 cm"
-    figure, axes_of = panels(curves, title, 2.1, sharex=True, sharey=True)
-    for band, ax in axes_of.items():
-        for (method, curve), dash in zip(curves[band].items(), cycle(DASHES)):
-            error = 100 * curve.mean_error
-            ax.plot(curve.iteration, error, color=styles[method].color, lw=1.2, ls=dash)
-        ax.axhline(1, color=INK, lw=0.8)
-        ax.set_xlabel("PPO iteration (line: 1 cm)")
-        log_y(ax)
-    next(iter(axes_of.values())).set_ylabel("mean |landing − target| [cm]")
-    methods = dict.fromkeys(method for of_band in curves.values() for method in of_band)
-    dashes = dict(zip(methods, cycle(DASHES)))
-    explain(figure, [(styles[m].name, mark(color=styles[m].color, ls=dashes[m])) for m in methods])
-    return figure
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli.plan.force import Held, Prediction
 from sling2sim2real.cli.plan.pull import BACK
 from sling2sim2real.cli.plan.trajectory import Trajectory
-from sling2sim2real.episode.planned import PULL, leg_time
+from sling2sim2real.episode.planned import PULL
 from sling2sim2real.settings.lab import PlanParams, SetupParams
 from sling2sim2real.settings.recording import EpisodeParams
 from sling2sim2real.simulator.model import BandSizes
@@ -105,10 +105,9 @@ def check_floor(trajectory: Trajectory, setup: SetupParams, plan: PlanParams) ->
 
 
 def check_window(
-    trajectory: Trajectory, plan: PlanParams, episode: EpisodeParams, precondition: int = 0
+    trajectory: Trajectory, plan: PlanParams, episode: EpisodeParams
 ) -> tuple[float, float]:
     """Grasp to release fits the episode. Returns what it takes, and what there is for it [s]."""
-    lasts = trajectory.until("release")
     taken = trajectory.start_of("release") - trajectory.start_of("grasp")
     most = episode.longest - episode.tail - LEAD
     over = taken - most
@@ -116,16 +115,8 @@ def check_window(
         advice = f"raise episode.longest to {np.ceil(10 * (episode.longest + over)) / 10:g}"
         if plan.dips:
             advice = f"take --pull paper, or shorter plan.dips, or {advice}"
-        if precondition:
-            advice = f"take a smaller --precondition, or {advice}"
-        shares = np.diff(sorted({0.0, 1.0, *(dip.at for dip in plan.dips)}))
-        legs = shares * np.linalg.norm(plan.draw)
-        time = lasts[PULL] - over
-        if time > 0:
-            speed = np.ceil(1000 * 2 * legs.sum() / time) / 1000
-            least = sum(leg_time(leg, speed, plan.max_acceleration) for leg in legs)
-            if speed <= plan.max_speed and least <= time + ROUNDING:
-                advice = f"raise plan.pull_speed to {speed:g}, or {advice.removeprefix('raise ')}"
+        if plan.pull_speed < plan.max_speed:
+            advice = f"raise plan.pull_speed, or {advice}"
         raise UserError(
             f"from grasp to release it takes {taken:.2f} s, {over:.2f} s more than episode.longest"
             f" {episode.longest:g} less episode.tail {episode.tail:g} and {LEAD:g} s leave:"

@@ -1,11 +1,10 @@
-"""A plan as files: CSV samples, ROS 2 messages as JSON, a picture."""
+"""A plan as files: CSV samples, ROS 2 messages as JSON."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
@@ -95,39 +94,6 @@ def gripper_commands(
         }
         for time, opening in moments
     ]
-
-
-def draw_picture(trajectory: Trajectory, path: Path | io.BytesIO) -> None:
-    """Path, speed and acceleration, frame O."""
-    from matplotlib.figure import Figure
-    from matplotlib.style import context
-
-    from sling2sim2real.drawing.styles import COLORS, INK, THEME
-
-    time = np.linspace(0, trajectory.duration, 1000)
-    with context(THEME):
-        figure = Figure(figsize=(7.0, 5.5))
-        axes = figure.subplots(3, sharex=True)
-        for axis, name, color in zip((1, 2), "yz", COLORS, strict=False):
-            axes[0].plot(time, trajectory.position(time)[:, axis], color=color, label=name)
-        for i, (name, unit) in enumerate((("speed", "m/s"), ("acceleration", "m/s²")), start=1):
-            size = np.linalg.norm(trajectory.position(time, i), axis=1)
-            axes[i].plot(time, size, color=INK)
-            axes[i].set_ylabel(f"{name} [{unit}]")
-        axes[0].set_ylabel("frame O [m]")
-        axes[0].legend()
-        axes[2].set_xlabel("time [s]")
-        for phase, start in zip(trajectory.phases, trajectory.times, strict=False):
-            for panel in axes:
-                panel.axvline(start, color=INK, linewidth=0.4)
-            axes[0].annotate(
-                phase.name,
-                (start, 1.0),
-                xycoords=("data", "axes fraction"),
-                rotation=40,
-                fontsize=7,
-            )
-        figure.savefig(path, dpi=150, format="png")
 
 
 def _vector(v: np.ndarray) -> dict[str, float]:

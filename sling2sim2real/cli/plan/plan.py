@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,13 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from tabulate import tabulate
 
 from sling2sim2real.api.arguments import USUAL
 from sling2sim2real.api.band_folder import BandFolder, lab_settings
 from sling2sim2real.api.identification import Identification
 from sling2sim2real.api.model import Band
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.files import replacing, write_json, write_text
+from sling2sim2real.base.files import write_json, write_text
 from sling2sim2real.cli.arguments import PULLS
 from sling2sim2real.cli.command_line import say
 from sling2sim2real.cli.plan import limits, messages
@@ -131,23 +131,15 @@ class Plan:
         return json.dumps({**self.content(), "files": written}, indent=2, allow_nan=False)
 
     def to_text(self, files: list[Path]) -> str:
-        lines = [
-            f"{'phase':<10}{'from':>8}{'to':>8}   {'ends at, frame O':<26}"
-            f"{'in ' + self.frame:<26}{'fingers':>8}{'speed':>8}{'accel.':>8}",
-            f"{'':<10}{'s':>8}{'s':>8}   {'m':<26}{'m':<26}{'m':>8}{'m/s':>8}{'m/s^2':>8}",
+        places = "fork", "base"
+        table = [
+            {**row, **{place: " ".join(f"{v:+.4f}" for v in row[place]) for place in places}}
+            for row in self.rows()
         ]
-        for row in self.rows():
-            fork, base = (" ".join(f"{v:+.4f}" for v in row[k]) for k in ("fork", "base"))
-            lines.append(
-                f"{row['phase']:<10}{row['start_s']:8.3f}{row['end_s']:8.3f}   {fork:<26}{base:<26}"
-                f"{row['opening_m']:8.3f}{row['max_speed_m_s']:8.3f}"
-                f"{row['max_acceleration_m_s2']:8.3f}"
-            )
+        heads = {name: name.replace("_", " ") for name in table[0]}
+        heads |= {"fork": "to, frame O [m]", "base": f"in {self.frame} [m]"}
         force = self.force
-        if force.force is None:
-            source = force.source
-        else:
-            source = f"{force.force:.1f} N of {self.max_force:g} N ({force.source})"
+        holds = f"{force.force or 0:.1f} N of {self.max_force:g} N ({force.source})"
         facts = {
             "hand": f"{' '.join(f'{v:+.4f}' for v in self.hand)} (x y z w in {self.frame})",
             "fork": f"in {self.frame} by {self.base_source}" if self.base_source else NO_BASE,
@@ -155,14 +147,14 @@ class Plan:
             "pull": f"{self.pull}, with {self.dips} dip{'s' * (self.dips != 1)}",
             "window": f"grasp to release {self.held_time:.2f} s of {self.most_time:.2f} s",
             "stretch": f"{self.stretch:.2f} of the rest length",
-            "force": source,
+            "force": force.source if force.force is None else holds,
         }
-        lines += ["", *(f"{name:<10}{value}" for name, value in facts.items())]
-        lines += ["", *(f"wrote {path}" for path in files)]
-        return "\n".join(lines)
+        lines = [tabulate(table, heads, tablefmt="plain", floatfmt=".3f"), ""]
+        lines += [*(f"{name:<10}{value}" for name, value in facts.items()), ""]
+        return "\n".join([*lines, *(f"wrote {path}" for path in files)])
 
     def write(self, folder: Path, rate: float) -> list[Path]:
-        """Write trajectory.csv, waypoints.json, gripper.json and plan.png into a folder.
+        """Write trajectory.csv, waypoints.json and gripper.json into a folder.
 
         Everything is made before the first file is written. Raises UserError.
         """
@@ -170,16 +162,12 @@ class Plan:
         table = messages.csv_text(*pose, rate)
         waypoints = messages.trajectory_message(*pose, self.frame)
         gripper = messages.gripper_commands(self.trajectory, self.gripper.command, self.grip_force)
-        picture = io.BytesIO()
-        messages.draw_picture(self.trajectory, picture)
-        names = ("trajectory.csv", "waypoints.json", "gripper.json", "plan.png")
+        names = ("trajectory.csv", "waypoints.json", "gripper.json")
         files = [Path(folder, name) for name in names]
         try:
             write_text(files[0], table)
             write_json(files[1], waypoints)
             write_json(files[2], gripper)
-            with replacing(files[3]) as temporary:
-                temporary.write_bytes(picture.getvalue())
         except OSError as error:
             raise UserError(f"{folder}: cannot be written ({error.strerror})") from error
         return files
@@ -224,7 +212,6 @@ def plan_recording(
     found: Identification | None = None,
     draw: tuple[float, float] | None = None,
     pull: str = INFORMATIVE,
-    precondition: int = 0,
     pulls: int = 1,
 ) -> Plan:
     """Plan the recording of a band and check it against every limit.
@@ -239,14 +226,11 @@ def plan_recording(
         found: The band, where it has been identified: it tells the force too.
         draw: Drawn position (y, z), frame O [m]; plan.draw if None.
         pull: INFORMATIVE with plan.dips, PAPER without.
-        precondition: How often the band is stretched to the draw first, in the first grasp.
         pulls: How many in one recording; between two the hand returns and grasps again.
 
     Raises:
         UserError: in one line, where a limit is broken or something is not known.
     """
-    if precondition > MOST_PULLS:
-        raise UserError(f"--precondition: at most {MOST_PULLS}, got {precondition}")
     if pulls > MOST_PULLS:
         raise UserError(f"--pulls: at most {MOST_PULLS} in one recording, got {pulls}")
     setup = params.setup
@@ -267,10 +251,10 @@ def plan_recording(
     dips = settings.dips if pull == INFORMATIVE else ()
     plan = settings.model_copy(update={"dips": dips})
     limits.check_dips(plan)
-    trajectory = trajectory_of(plan, setup, params.episode, band, axis, pulls, precondition)
+    trajectory = trajectory_of(plan, setup, params.episode, band, axis, pulls)
     limits.check_motion(trajectory, plan)
     limits.check_floor(trajectory, setup, plan)
-    held_time, most_time = limits.check_window(trajectory, plan, params.episode, precondition)
+    held_time, most_time = limits.check_window(trajectory, plan, params.episode)
     limits.check_force(setup, held, drawn, prediction)
     below = -hanging_middle(settings, setup, band)[2]
     by = "as a string's catenary" if settings.hanging is None else "plan.hanging"

@@ -21,7 +21,6 @@ from sling2sim2real.settings.recording import EpisodeParams
 from sling2sim2real.simulator.model import BandSizes
 
 TICK = 0.001  # s: phases last whole ticks
-STRETCH, SLACKEN = "stretch", "slacken"  # a preconditioning pull, and back to the fork
 BACK = LET_BACK, REDRAW
 SPARE = 0.5  # s beyond what the episode asks for, since nobody starts a recorder on the tick
 
@@ -57,7 +56,6 @@ def trajectory_of(
     band: BandSizes,
     axis: np.ndarray,
     pulls: int = 1,
-    precondition: int = 0,
 ) -> Trajectory:
     """The whole recording, frame O.
 
@@ -65,7 +63,6 @@ def trajectory_of(
         plan, setup, episode, band: Those sections of params.
         axis: Unit vector along which the fingers point, shape (3,); they come and go along it.
         pulls: How many, one after the other.
-        precondition: How often the first grasp stretches the band to the draw before its pull.
     """
     middle = hanging_middle(plan, setup, band)
     level = np.zeros(3)
@@ -106,11 +103,6 @@ def trajectory_of(
     between = wait + retreat.duration + back.duration + taken
     rest = max(plan.lead_in, CALM + SPARE + before - between)
     again = [back, Phase("lead-in", start, _ticks(rest), wide), *pull]
-    first = [
-        leg(STRETCH, level, drawn, plan.max_speed, closed),
-        leg(SLACKEN, drawn, level, plan.max_speed, closed),
-    ]
-    pull[3:3] = precondition * first  # after approach, grasp and lift
     phases = [Phase("lead-in", start, _ticks(plan.lead_in), wide), *pull, *(pulls - 1) * again]
     return Trajectory.through(start, wide, [phase for phase in phases if phase.duration > 0])
 

@@ -9,8 +9,7 @@ acceleration are continuous and begin and end at zero, as robots ask for:
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,15 +81,6 @@ class Trajectory:
             if phase.name == name:
                 return float(time)
         raise KeyError(name)
-
-    def until(self, name: str) -> Mapping[str, float]:
-        """Time by names of phases before the first called `name` begins [s]; 0 of any other."""
-        lasts: defaultdict[str, float] = defaultdict(float)
-        for phase in self.phases:
-            if phase.name == name:
-                break
-            lasts[phase.name] += phase.duration
-        return lasts
 
     def position(self, time: np.ndarray | float, derivative: int = 0) -> np.ndarray:
         """Position, or a derivative of it by time, at times (...) [s], shape (..., 3).

@@ -3,14 +3,14 @@
 A method's key `engine` names what simulates. Another engine than ours is a function
 `simulate(band, *, episode, parameters, device) -> Rollouts` of whole batches: of a ClampedBand
 (simulator/model.py) with N Parameters (simulator/parameters.py); the rollouts
-(simulator/interaction.py) stay on the host. It runs on one device, whichever it chooses.
+(simulator/interaction.py) stay on the host.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -23,7 +23,7 @@ import numpy as np
 
 from sling2sim2real.base.errors import UserError, one_line
 from sling2sim2real.base.imported import imported, is_import
-from sling2sim2real.base.machine import devices, workers
+from sling2sim2real.base.machine import device, workers
 from sling2sim2real.base.progress import Progress
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.box import SearchBox
@@ -63,8 +63,7 @@ class Evaluation:
 class Evaluator:
     """Evaluates points of the unit cube against one episode.
 
-    Results ignore the number of workers, and of GPUs of one kind: a rollout knows none of the
-    others in its batch.
+    Results ignore the number of workers: a rollout knows none of the others in its batch.
     """
 
     def __init__(
@@ -74,7 +73,7 @@ class Evaluator:
         loss: EpisodeLoss,
         box: SearchBox,
         *,
-        devices: Sequence[str] = ("cpu",),
+        device: str = "cpu",
         workers: int | None = None,
         simulate: Simulate = simulated,
         whole: bool = False,
@@ -83,19 +82,16 @@ class Evaluator:
 
         Args:
             band: Its pads open as the recording shows, where that says it.
-            devices: Of one kind; they share each batch evenly, in their order.
             workers: Threads on the CPU (the kernels release the interpreter); None: all cores.
             simulate: Called as `simulate(band, episode=, parameters=, device=)`.
-            whole: One call a batch, on the first device.
+            whole: One call a batch.
         """
         self.box, self.loss = box, loss
         self._band = with_recorded_pads(band, episode)
-        self._simulate = partial(simulate, episode=episode)
-        on_gpu = devices[0].startswith("cuda")
+        self._simulate = partial(simulate, episode=episode, device=device)
+        on_gpu = device.startswith("cuda")
         self._slice = sys.maxsize if whole else SLICE["cuda" if on_gpu else "cpu"]
-        threads = 1 if on_gpu else workers or os.cpu_count()
-        self._devices = devices[:1] if whole else devices
-        self._pools = [ThreadPoolExecutor(threads) for _ in self._devices]
+        self._pool = ThreadPoolExecutor(1 if on_gpu else workers or os.cpu_count())
 
     @classmethod
     def of(
@@ -106,14 +102,14 @@ class Evaluator:
         sling: ClampedBand,
         box: SearchBox | None = None,
     ) -> Evaluator:
-        """Make it for a method of params.yaml, on the devices that the environment names."""
+        """Make it for a method of params.yaml, on the device that the environment names."""
         engine = params.methods[method].engine
         return cls(
             episode,
             sling,
             EpisodeLoss.of(params, method, episode, sling),
             box or SearchBox.of_method(params, method),
-            devices=devices(),
+            device=device(),
             workers=workers(),
             simulate=simulate_of(engine),
             whole=engine != OUR_ENGINE,
@@ -123,12 +119,8 @@ class Evaluator:
         """Evaluate points of the unit cube, shape (N, D)."""
         unit = np.array(unit, float)
         theta = self.box.to_physical(unit)
-        shares = np.array_split(theta, len(self._devices))
-        begun = [  # on all of them, before any result is waited for
-            pool.map(partial(self._evaluate, device), self._slices(share))
-            for device, pool, share in zip(self._devices, self._pools, shares, strict=True)
-        ]
-        parts = [part for each in begun for part in each]
+        slices = (theta[i : i + self._slice] for i in range(0, len(theta), self._slice))
+        parts = list(self._pool.map(self._evaluate, slices))
         terms = {name: np.concatenate([part[0][name] for part in parts]) for name in TERMS}
         failure = [reason for part in parts for reason in part[1]]
         with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
@@ -142,14 +134,9 @@ class Evaluator:
         total = np.where(failed, np.inf, total)
         return Evaluation(unit, theta, terms, total, failure)
 
-    def _slices(self, theta: np.ndarray) -> Iterator[np.ndarray]:
-        return (theta[i : i + self._slice] for i in range(0, len(theta), self._slice))
-
-    def _evaluate(
-        self, device: str, theta: np.ndarray
-    ) -> tuple[dict[str, np.ndarray], list[str | None]]:
+    def _evaluate(self, theta: np.ndarray) -> tuple[dict[str, np.ndarray], list[str | None]]:
         parameters = self.box.parameters(theta)
-        rollouts = self._simulate(self._band, parameters=parameters, device=device)
+        rollouts = self._simulate(self._band, parameters=parameters)
         with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
             return self.loss.terms(rollouts), rollouts.failure
 

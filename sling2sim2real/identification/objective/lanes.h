@@ -40,7 +40,7 @@ const int lane = 0;
 auto taken = [](const float* array, int stride, int size) -> real { real x; for (int k = 0; k < LANES; ++k) x[k] = array[stride * (k < size ? k : size - 1)]; return x; };
 auto put = [](auto* array, auto x) { *(decltype(x)*)array = x; };
 auto bits_of = [](flags x) -> unsigned { unsigned bits = 0; __builtin_memcpy(&bits, &x, sizeof(x)); return bits; };
-auto root = [](real x) -> real { for (int k = 0; k < LANES; ++k) x[k] = __builtin_sqrtf(x[k]); return x; };
+auto root = [](real x) -> real { return __builtin_elementwise_sqrt(x); };
 auto sum = [](real x) -> float { float s = 0.0f; for (int k = 0; k < LANES; ++k) s += x[k]; return s; };
 auto least = [](real x) -> float {
   _Pragma("clang loop unroll(full)")
@@ -52,6 +52,7 @@ auto least = [](real x) -> float {
   return x[0];
 };
 #endif
+#define PLACE(array, block) ROW(array, block, 0), ROW(array, block, 1), ROW(array, block, 2)
 const real zero = real() * 0.0f;
 #define FAR 1e30f
 #define INFINITE (FAR * FAR)
@@ -88,14 +89,6 @@ enum {
 SHARED float surface[ROWS][WIDE];
 SYNC();  // a block may have had another frame before
 
-auto to_axis = [&](int part, real x, real y, real z) -> real {
-  const real dx = x - surface[START][part], dy = y - surface[START + 1][part], dz = z - surface[START + 2][part];
-  real at = dx * surface[ALONG][part] + dy * surface[ALONG + 1][part] + dz * surface[ALONG + 2][part];
-  at = at < 0.0f ? zero : at;
-  at = at > 1.0f ? zero + 1.0f : at;
-  const real ex = dx - at * surface[AXIS][part], ey = dy - at * surface[AXIS + 1][part], ez = dz - at * surface[AXIS + 2][part];
-  return ROOT(ex * ex + ey * ey + ez * ez);
-};
 auto square_to = [&](const float* point, real x, real y, real z) -> real {
   const real dx = x - point[0], dy = y - point[WIDE], dz = z - point[2 * WIDE];
   return dx * dx + dy * dy + dz * dz;

@@ -52,4 +52,18 @@ for (int e = 0; e < EDGES; e += LANES) {
 SYNC();
 const float weights = rest_length * (float)VERTICES;
 
-auto gap_to = [&](int part, real x, real y, real z) -> real { return to_axis(part, x, y, z) - surface[RADIUS][part]; };
+auto square_to_axis = [&](int part, real x, real y, real z) -> real {
+  const real dx = x - surface[START][part], dy = y - surface[START + 1][part], dz = z - surface[START + 2][part];
+  real at = dx * surface[ALONG][part] + dy * surface[ALONG + 1][part] + dz * surface[ALONG + 2][part];
+  at = at < 0.0f ? zero : at;
+  at = at > 1.0f ? zero + 1.0f : at;
+  const real ex = dx - at * surface[AXIS][part], ey = dy - at * surface[AXIS + 1][part], ez = dz - at * surface[AXIS + 2][part];
+  return ex * ex + ey * ey + ez * ez;
+};
+#define AXIS_IS_MIDDLE 0
+#define METRES(gap) gap
+// Of points from a part's surface [m], and from its vertices, squared
+auto gap_to = [&](int part, real x, real y, real z, real (&squares)[VERTICES]) -> real {
+  for (int k = 0; k < VERTICES; ++k) squares[k] = square_to(&surface[VERTEX + 3 * k][part], x, y, z);
+  return ROOT(square_to_axis(part, x, y, z)) - surface[RADIUS][part];
+};

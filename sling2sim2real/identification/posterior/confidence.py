@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from sling2sim2real.base.parameters import TABLE
 from sling2sim2real.episode.episode import Episode
@@ -12,8 +13,8 @@ from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.posterior.coordinates import DAMPING, PRODUCT
 from sling2sim2real.identification.posterior.identify import Identified, recorded_history
-from sling2sim2real.identification.posterior.launches import without_each
 from sling2sim2real.identification.posterior.likelihood import SIMULATED
+from sling2sim2real.identification.posterior.sampling import without_each
 from sling2sim2real.identification.results.evaluations import Evaluations
 from sling2sim2real.identification.results.theta import content_of
 from sling2sim2real.settings import Settings
@@ -75,7 +76,8 @@ def confidence(density: Identified) -> dict:
         "disagreement": density.birge,
         "launches": _launches(density),
         "steps": density.fit.steps,
-        "settled": density.fit.settled,
+        "settled": density.settled,
+        "edges": density.edges,
         "effective_samples": density.effective,
     }
 
@@ -152,17 +154,12 @@ def _recording(density: Identified, number: int) -> dict:
 
 def leave_one_out(density: Identified, number: int) -> dict:
     """How the mode of all other evidence predicts the one left out, by their quadratics."""
-    expansion = density.fit.expansions[number]
-    hessian, gradient = (
-        density.fit.hessian - expansion.hessian,
-        density.fit.gradient - expansion.gradient,
-    )
-    phi = np.clip(
-        density.fit.phi + np.linalg.solve(hessian, gradient),
-        density.coordinates.low,
-        density.coordinates.high,
-    )
-    moved = phi - density.fit.phi
+    expansion, phi = density.fit.expansions[number], density.fit.phi
+    hessian = density.fit.hessian - expansion.hessian
+    gradient = density.fit.gradient - expansion.gradient
+    ends = density.coordinates.low - phi - 1e-12, density.coordinates.high - phi + 1e-12
+    root = np.linalg.cholesky(hessian)
+    moved = lsq_linear(root.T, np.linalg.solve(root, gradient), ends, method="bvls").x
     worse = moved @ expansion.hessian @ moved - 2 * expansion.gradient @ moved
     spread = np.sqrt(np.diag(np.linalg.inv(hessian)))
     return {
@@ -176,8 +173,7 @@ def _launches(density: Identified) -> list[dict]:
     launches, expansion = density.launches, density.fit.launches
     if launches is None or expansion is None:
         return []
-    wide = density.density
-    scores = without_each(expansion, wide.hessian, wide.gradient, density.birge)
+    scores = without_each(density.density, density.coordinates, density.birge)
     return [
         {
             "draw": draw.tolist(),

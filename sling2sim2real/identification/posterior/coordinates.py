@@ -7,6 +7,9 @@ log E, log of the loss factor s d c/L, what the law adds, the linear rest of the
 damping brakes turns, and the log of the returned share: what a launch gets of the energy that the
 law would give it, which launches alone can show. What no recording of a pull can tell is fixed by
 the method: Poisson's ratio, friction and the damping's scale; and what of the law it fixes besides.
+
+Many rubbers have nothing of an effect that others have, such as softening. Its coordinate is that
+of a rectified Gaussian: below 0 the parameter is 0, which so has half of the prior.
 """
 
 from __future__ import annotations
@@ -42,6 +45,7 @@ class Coordinates:
         fixed: Values by name: of UNSEEN, and of the law's parameters that are no coordinates.
         wave: L / (c sqrt(E)) of the band [s Pa^-1/2].
         expected, precision: Of Gaussian priors, shape (D,); precision 0 where there is none.
+        lowest: `low`, but -inf of a rectified one; samples lie between it and `high`, shape (D,).
     """
 
     law: str
@@ -52,6 +56,7 @@ class Coordinates:
     wave: float
     expected: np.ndarray
     precision: np.ndarray
+    lowest: np.ndarray
 
     @classmethod
     def of_method(cls, params: Settings, method: str, sling: ClampedBand) -> Coordinates:
@@ -80,8 +85,9 @@ class Coordinates:
             ends.append(bounds)
         priors = [coordinate.prior or (0.0, np.inf) for _, coordinate in rows.values()]
         (low, high), (expected, spread) = np.array(ends, float).T, np.array(priors).T
-        law, names = method_params.law, tuple(rows)
-        return cls(law, names, low, high, fixed, float(wave), expected, spread**-2)
+        rectified = [coordinate.rectified for _, coordinate in rows.values()]
+        lowest, law = np.where(rectified, -np.inf, low), method_params.law
+        return cls(law, tuple(rows), low, high, fixed, float(wave), expected, spread**-2, lowest)
 
     @property
     def steps(self) -> np.ndarray:
@@ -97,13 +103,17 @@ class Coordinates:
         return self.quantiles(np.repeat([[1 - level], [1 + level]], len(self.names), axis=1) / 2)
 
     def quantiles(self, parts: np.ndarray) -> np.ndarray:
-        """Quantiles of the priors, each even or a Gaussian within its bounds, at parts (N, D)."""
+        """Quantiles of the priors at parts (N, D): even, or a Gaussian within bounds, rectified."""
         values = self.low + parts * (self.high - self.low)
         gaussian = self.precision > 0
         mean, spread = self.expected[gaussian], self.precision[gaussian] ** -0.5
-        low, high = ((end[gaussian] - mean) / spread for end in (self.low, self.high))
+        low, high = ((end[gaussian] - mean) / spread for end in (self.lowest, self.high))
         values[:, gaussian] = truncnorm.ppf(parts[:, gaussian], low, high, mean, spread)
-        return values
+        return self.rectified(values)
+
+    def rectified(self, phi: np.ndarray) -> np.ndarray:
+        """Coordinates (N, D) of which none is below its parameter's end."""
+        return np.maximum(phi, self.low)
 
     def shows(self, name: str) -> int | None:
         """Number of the coordinate that a parameter shows; None: it is fixed."""

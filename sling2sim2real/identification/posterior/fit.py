@@ -231,16 +231,20 @@ def _stacked(
     return Fit(phi, nuisances, expansions, launched, evidence, hessian, gradient, steps)
 
 
+def held(fitted: Fit, coordinates: Coordinates) -> np.ndarray:
+    """Which coordinates (D,) lie at a bound beyond which the density would be larger."""
+    low, high = fitted.phi <= coordinates.low, fitted.phi >= coordinates.high
+    return np.where(fitted.gradient < 0, low, high)
+
+
 def widened(fitted: Fit, coordinates: Coordinates, by: float) -> Fit:
     """The density where all evidence, but no prior, is less sure: standard deviations times `by`.
 
     A gradient counts where it leads out of the bounds. Elsewhere it is what a settled fit left of
     a step that led no further.
     """
-    low, high = coordinates.low, coordinates.high
-    outward = np.where(fitted.gradient < 0, fitted.phi <= low, fitted.phi >= high)
     prior = coordinates.precision
     pull = prior * (coordinates.expected - fitted.phi)
     hessian = (fitted.hessian - np.diag(prior)) / by**2 + np.diag(prior)
-    gradient = (fitted.gradient * outward - pull) / by**2 + pull
+    gradient = (fitted.gradient * held(fitted, coordinates) - pull) / by**2 + pull
     return replace(fitted, hessian=hessian, gradient=gradient)

@@ -1,8 +1,8 @@
 """Gain of knowing more: how much the interval of a landing would narrow.
 
 Near the mode a landing is linear in what is not known, which is Gaussian: both as the samples of
-the posterior have them. A launch, another pull, or knowing some parameters exactly then changes
-the covariance by plain algebra.
+the posterior have them. A launch, or knowing some parameters exactly, then changes the covariance
+by plain algebra.
 """
 
 from __future__ import annotations
@@ -13,10 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sling2sim2real.base.parameters import TABLE, Parameter
-from sling2sim2real.identification.posterior.coordinates import DAMPING
 
-HALF_NORMAL_VARIANCE = 1 - 2 / np.pi  # its variance, of a normal's
-EVEN_VARIANCE = 1 / 12  # of a range
 LEAST_RANGE = 1e-9  # of a column that the samples vary
 
 
@@ -96,35 +93,6 @@ class LandingModel:
         """Covariance after unknowns were measured to a standard deviation."""
         which = [self.names.index(name) for name in names if name in self.names]
         return self.measured(np.eye(len(self.names))[which], spread**2)
-
-    def pulled(self, pulls: int = 1) -> np.ndarray:
-        """Covariance after another pull that tells as much as each of the `pulls` did."""
-        prior = self._prior()
-        values, vectors = np.linalg.eigh(np.linalg.inv(self.covariance) - prior)
-        explained = (vectors * np.maximum(values, 0)) @ vectors.T
-        return np.linalg.inv(np.linalg.inv(self.covariance) + explained / pulls)
-
-    def _prior(self) -> np.ndarray:
-        """Precision (D, D) of what is known without any pull; a bound tells as its own spread."""
-        precision = np.zeros_like(self.covariance)
-        for row in TABLE:
-            if not (isinstance(row, Parameter) and row.coordinate and row.name in self.names):
-                continue
-            direction = np.zeros(len(self.names))  # of the coordinate in the unknowns
-            direction[self.names.index(row.name)] = 1.0
-            if row.name == DAMPING:  # by the loss factor s d c/L, c^2 proportional to E
-                if "youngs_modulus" not in self.names:
-                    continue
-                direction[self.names.index("youngs_modulus")] = 0.5
-            if row.coordinate.prior:
-                variance = row.coordinate.prior[1] ** 2
-                variance *= HALF_NORMAL_VARIANCE if row.coordinate.half else 1.0
-            elif row.coordinate.bounds:
-                variance = EVEN_VARIANCE * np.ptp(row.coordinate.bounds) ** 2
-            else:  # within a method's box
-                continue
-            precision += np.outer(direction, direction) / variance
-        return precision
 
 
 def unknowns(names: Sequence[str], samples: np.ndarray) -> dict[str, np.ndarray]:

@@ -18,12 +18,14 @@ from sling2sim2real.episode.episode import Episode
 from sling2sim2real.episode.pull import deepest_draw, launch_history
 from sling2sim2real.episode.signal import cutoff_hz
 from sling2sim2real.identification.posterior.coordinates import Coordinates
-from sling2sim2real.identification.posterior.fit import Fit, fit, widened
+from sling2sim2real.identification.posterior.fit import Fit, fit, held, widened
 from sling2sim2real.identification.posterior.launches import Evidence, LaunchLikelihood
 from sling2sim2real.identification.posterior.likelihood import SIMULATED, Failed, Likelihood
 from sling2sim2real.identification.posterior.residuals import BINS, LEAST_POINTS
 from sling2sim2real.identification.posterior.sampling import SAMPLES, Remaining, samples_of
+from sling2sim2real.identification.results.ranges import at_edges
 from sling2sim2real.settings import Settings
+from sling2sim2real.settings.identification import parameter_names
 from sling2sim2real.simulator.model import ClampedBand, LaunchHistory
 from sling2sim2real.simulator.parameters import Parameters
 from sling2sim2real.simulator.rubber import RUBBER
@@ -43,6 +45,7 @@ class Identified:
         effective, batches: How many samples of even weight these are worth, and how many batches
             of SAMPLES rollouts they took of each recording.
         recordings, launches: The evidence.
+        edges: Parameters of θ at an end of their bounds, and which: the true value may lie outside.
     """
 
     coordinates: Coordinates
@@ -53,6 +56,12 @@ class Identified:
     batches: int
     recordings: list[Likelihood]
     launches: LaunchLikelihood | None
+    edges: dict[str, str]
+
+    @property
+    def settled(self) -> bool:
+        """Whether the fit has settled, and not at an edge."""
+        return self.fit.settled and not self.edges
 
     @property
     def density(self) -> Fit:
@@ -136,10 +145,21 @@ def fit_posterior(
                 " fitted",
                 file=sys.stderr,
             )
-    birge = birge_ratio(fitted)
+    birge = birge_ratio(fitted, coordinates)
     evidence_left = Remaining(fitted, coordinates, recordings, launches, workers or cores())
     samples, effective, batches = samples_of(evidence_left, birge, params.optimizer.seed)
-    return Identified(coordinates, fitted, birge, samples, effective, batches, recordings, launches)
+    mode = coordinates.parameters(fitted.phi[None]).sample()
+    return Identified(
+        coordinates,
+        fitted,
+        birge,
+        samples,
+        effective,
+        batches,
+        recordings,
+        launches,
+        at_edges(params, method, {name: mode[name] for name in parameter_names(coordinates.law)}),
+    )
 
 
 def recorded_history(sling: ClampedBand, episodes: Sequence[Episode]) -> LaunchHistory | None:
@@ -153,19 +173,21 @@ def recorded_history(sling: ClampedBand, episodes: Sequence[Episode]) -> LaunchH
     return LaunchHistory(pull_history["pull_time"], pull_history["pause"], deepest_draw(episodes))
 
 
-def birge_ratio(fitted: Fit) -> float:
+def birge_ratio(fitted: Fit, coordinates: Coordinates) -> float:
     """Birge's ratio of N recordings, at least 1: how far each alone would go from the mode.
 
     Of each, the drop of its misfit to its own least is chi squared of D' D (N - 1)/N coordinates
-    that it tells, D' those which it knows better than the rest together.
+    that it tells, D' those which it knows better than the rest together. A coordinate that is held
+    at a bound does not count: recordings that all would have it beyond do not differ in that.
     """
     if len(fitted.expansions) < 2:
         return 1.0
-    total = freedom = 0.0
+    free = np.flatnonzero(~held(fitted, coordinates))
+    every, total, freedom = fitted.hessian[np.ix_(free, free)], 0.0, 0.0
     for expansion in fitted.expansions:
-        # The sum is regular where the recording alone shows nothing.
-        inverse = np.linalg.inv(expansion.hessian + fitted.hessian)
-        share = np.linalg.solve(fitted.hessian, expansion.hessian)
-        total += expansion.gradient @ inverse @ expansion.gradient
-        freedom += np.trace(inverse @ expansion.hessian @ (np.eye(len(share)) - share))
+        own, gradient = expansion.hessian[np.ix_(free, free)], expansion.gradient[free]
+        inverse = np.linalg.inv(own + every)  # regular where the recording alone shows nothing
+        share = np.linalg.solve(every, own)
+        total += gradient @ inverse @ gradient
+        freedom += np.trace(inverse @ own @ (np.eye(len(share)) - share))
     return float(np.sqrt(max(total / max(freedom, 1e-9), 1.0)))

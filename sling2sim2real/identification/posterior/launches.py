@@ -179,27 +179,3 @@ class LaunchLikelihood:
         launched = launch(self.sling, setup, parameters, draws, workers=self.workers)
         failed = np.array([why is not None for why in launched.failure])
         return np.where(failed, np.nan, launched.landing_y)
-
-
-def without_each(
-    launches: LaunchExpansion, hessian: np.ndarray, gradient: np.ndarray, widening: float = 1.0
-) -> np.ndarray:
-    """How unlikely each launch is by all other evidence, as a standard score (leave-one-out).
-
-    By the density's quadratic at its mode: without launch i the precision is H - d d' and the
-    gradient g - d gap, d its column of `design`.
-
-    Args:
-        hessian, gradient: Of the density at its mode, widened, shapes (D, D) and (D,).
-        widening: By what the evidence's standard deviations are multiplied in it.
-
-    Returns:
-        Shape (N,); positive where it landed further than predicted, NaN for a launch that fails.
-    """
-    scores = np.full(len(launches.gap), np.nan)
-    for i in np.flatnonzero(~launches.failed):
-        gap, slope = launches.gap[i], launches.design[:, i]
-        rest = hessian - np.outer(slope, slope) / widening**2
-        off = gap - slope @ np.linalg.solve(rest, gradient - slope * gap / widening**2)
-        scores[i] = off / np.sqrt(1 + slope @ np.linalg.solve(rest, slope))
-    return scores

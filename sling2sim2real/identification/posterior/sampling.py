@@ -8,7 +8,8 @@ J. R. Stat. Soc. B 13, 1951), of which differential evolution (ter Braak, Stat. 
 draws samples. The next batch is simulated there. Its importance weights take out what the surface
 gets wrong, and say by how much: N weighted samples are worth (sum w)^2 / sum w^2 of even weight
 (Kish, Survey Sampling, 1965). Where that is little, the surface is fitted to that batch too, and
-so on.
+so on. A rectified coordinate (coordinates.py) is sampled below its parameter's end too, where r is
+what it is at that end.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ SURFACE_TEMPER = 0.3  # power of the density, by which a rollout counts for the 
 SURFACE_RIDGE = 1e-2  # of the terms of second order
 CHAIN_STEPS = 300  # of the chains, which start at the last batch: some six autocorrelation times
 GIBBS_SWEEPS = 250  # of chains that begin at the centre
+LEFT_SAMPLES = 2000  # by which a launch is judged that is left out
+LEAST_LEFT = 1e-6  # of a coordinate's precision
 TAIL_END = 8.0  # standard deviations, where a tail has no numbers left
 
 
@@ -53,8 +56,8 @@ class Remaining:
 
     def __call__(self, phi: np.ndarray) -> np.ndarray:
         """Those at coordinates (N, D), shape (N, R); NaN where a simulation fails."""
-        fitted, parameters = self.fitted, self.coordinates.parameters(phi)
-        loss = phi[:, LOSS]
+        phi = self.coordinates.rectified(phi)
+        fitted, parameters, loss = self.fitted, self.coordinates.parameters(phi), phi[:, LOSS]
         residuals = [
             recording.remaining(parameters, expansion, nuisances, loss, self.workers)
             for recording, expansion, nuisances in zip(
@@ -76,7 +79,7 @@ def log_density(
     """
     prior = (phi - coordinates.expected) ** 2 @ coordinates.precision
     value = -0.5 * (np.nan_to_num(misfit, nan=np.inf) / widened**2 + prior)
-    inside = np.all((phi >= coordinates.low) & (phi <= coordinates.high), axis=1)
+    inside = np.all((phi >= coordinates.lowest) & (phi <= coordinates.high), axis=1)
     return np.where(inside, value, -np.inf)
 
 
@@ -126,6 +129,34 @@ def truncated_gaussian(
             tail = np.where(above > below, ndtri(np.clip(part, 1e-16, 1 - 1e-16)), ends[0])
             chains[:, axis] = np.clip(mean + deviation * tail, low[axis], high[axis])
     return chains
+
+
+def without_each(density: Fit, coordinates: Coordinates, widening: float = 1.0) -> np.ndarray:
+    """How unlikely each launch is by all other evidence, as a standard score (leave-one-out).
+
+    By the density's quadratic at its mode, within bounds: without launch i the precision is
+    H - d d' and the gradient g - d gap, d its column of `design`.
+
+    Args:
+        density: As `widened` gives it.
+        widening: By what the evidence's standard deviations are multiplied in it.
+
+    Returns:
+        Shape (N,); positive where it landed further than predicted, NaN for a launch that fails.
+    """
+    launches, box = density.launches, (coordinates.low, coordinates.high)
+    assert launches is not None
+    scores, ridge = np.full(len(launches.gap), np.nan), np.diag(np.diag(density.hessian))
+    for i in np.flatnonzero(~launches.failed):
+        gap, slope = launches.gap[i], launches.design[:, i]
+        # Of a coordinate that this launch alone tells nothing else would be left.
+        rest = density.hessian - np.outer(slope, slope) / widening**2 + LEAST_LEFT * ridge
+        step = np.linalg.solve(rest, density.gradient - slope * gap / widening**2)
+        rng = np.random.default_rng(i)
+        phi = truncated_gaussian(density.phi + step, rest, *box, LEFT_SAMPLES, rng)
+        longer = ndtr((phi - density.phi) @ slope - gap).mean()  # chance of a longer landing
+        scores[i] = -ndtri(np.clip(longer, 1e-12, 1 - 1e-12))
+    return scores
 
 
 @dataclass(frozen=True)
@@ -180,6 +211,7 @@ def samples_of(remaining: Remaining, widening: float, seed: int) -> tuple[np.nda
         Gaussian, where all simulations fail; and how many batches were simulated.
     """
     coordinates, random = remaining.coordinates, RandomState(seed)
+    rectified = coordinates.rectified
     density = widened(remaining.fitted, coordinates, widening)
     scale = np.sqrt(np.diag(np.linalg.inv(density.hessian)))
     batch = samples_around(density, coordinates, np.random.default_rng(seed))
@@ -192,7 +224,9 @@ def samples_of(remaining: Remaining, widening: float, seed: int) -> tuple[np.nda
         seen, count = remaining(batch), count + 1
         if surface is not None:
             exact = log(batch, np.sum(seen**2, axis=1))
-            weighed = _resampled(batch, exact - log(batch, surface.misfit(batch)), random)
+            weighed = _resampled(
+                batch, exact - log(batch, surface.misfit(rectified(batch))), random
+            )
             best = max(best, weighed, key=lambda it: it[1])
             if best[1] > ENOUGH_EFFECTIVE:
                 break
@@ -203,9 +237,12 @@ def samples_of(remaining: Remaining, widening: float, seed: int) -> tuple[np.nda
             break
         logs = log(phi[good], np.sum(residuals[good] ** 2, axis=1))
         weight = np.exp(SURFACE_TEMPER * (logs - logs.max()))
-        surface = QuadraticSurface.fitted(density.phi, scale, phi[good], residuals[good], weight)
-        batch = _evolved(lambda at, by=surface: log(at, by.misfit(at)), batch, random)
-    return *best, count
+        surface = QuadraticSurface.fitted(
+            density.phi, scale, rectified(phi[good]), residuals[good], weight
+        )
+        batch = _evolved(lambda at, by=surface: log(at, by.misfit(rectified(at))), batch, random)
+    samples, effective = best
+    return rectified(samples), effective, count
 
 
 def _resampled(

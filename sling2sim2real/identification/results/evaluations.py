@@ -18,10 +18,10 @@ import pyarrow.parquet as pq
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import column, read_table, replacing
 from sling2sim2real.settings.identification import POSTERIOR
-from sling2sim2real.simulator.parameters import Parameters
 
 if TYPE_CHECKING:
     from sling2sim2real.identification.objective.evaluate import Evaluation
+    from sling2sim2real.simulator.parameters import Parameters
 
 TERMS = ("geom", "force", "work")  # of the paper's loss
 UNIT = "unit_"  # before the name of an axis: its coordinate in the unit cube
@@ -105,6 +105,8 @@ class Evaluations:
 
     def best_parameters(self, law: str) -> Parameters:
         """One sample, of the best row. Raises UserError as `best_row`."""
+        from sling2sim2real.simulator.parameters import Parameters  # not for who only reads rows
+
         best = self.best_row()
         return Parameters.named(law, {name: best[name] for name in self.names})
 

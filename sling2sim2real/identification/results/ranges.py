@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +42,13 @@ class SearchedRange(NamedTuple):
         if place > 1 - EDGE:
             return "upper"
         return "lower" if place < EDGE and self.low != 0 else ""
+
+
+def at_edges(params: Settings, method: str, theta: Mapping[str, float]) -> dict[str, str]:
+    """Values of θ at an edge of what a method searches: "lower" or "upper" by name."""
+    ranges = searched(params, method)
+    edges = {name: ranges[name].edge(theta[name]) for name in ranges if name in theta}
+    return {name: side for name, side in edges.items() if side}
 
 
 def searched(params: Settings, method: str) -> dict[str, SearchedRange]:

@@ -18,7 +18,7 @@ not where it is used. What it rests on, samples of θ, lies beside in data/confi
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, create_model, model_validator
@@ -134,6 +134,7 @@ class Confidence(JsonRecord):
     derived: dict[Name, DerivedQuantity]
     recordings: Annotated[list[RecordingResiduals], FILLED]
     settled: bool
+    edges: dict[Name, Literal["lower", "upper"]] = {}
     steps: Count = 0
     effective_samples: float | None = None
     disagreement: float = 1.0

@@ -11,6 +11,8 @@ from sling2sim2real.launching.surface.response_surface import (
     Landings,
     ResponseSurface,
 )
+from sling2sim2real.settings.lab import SetupParams
+from sling2sim2real.simulator.parameters import Parameters
 
 
 class SimulatedLandings:
@@ -21,20 +23,19 @@ class SimulatedLandings:
         low, high: Corners of the box of draws [m], shape (2,).
     """
 
-    def __init__(self, launcher: Launcher, surface: ResponseSurface) -> None:
-        """Launch in the box and under the force limit of a surface.
+    def __init__(self, launcher: Launcher, setup: SetupParams) -> None:
+        """Launch in the box and under the force limit of `setup`.
 
         Args:
             launcher: Simulates draws, shape (N, 2) [m], without a force limit of its own.
-            surface: Read between launches of the same simulator.
         """
-        self.launcher, self.max_force = launcher, surface.max_force
-        self.low, self.high = surface.low, surface.high
+        self.launcher, self.max_force = launcher, setup.max_force
+        self.low, self.high = np.array([setup.draw_y, setup.draw_z], float).T
         self.reasons = [NO_FAILURE, TOO_MUCH_FORCE]
 
-    def __call__(self, draws: np.ndarray) -> Landings:
-        """Landings of draws, shape (N, 2) [m]."""
-        launched = self.launcher(np.asarray(draws, float))
+    def __call__(self, draws: np.ndarray, *theta: Parameters) -> Landings:
+        """Landings of draws, shape (N, 2) [m]; each with its own θ, where they are given."""
+        launched = self.launcher(np.asarray(draws, float), *theta)
         force = np.asarray(launched.hold_force, float)
         failure = np.array([self._code(reason) for reason in launched.failure], int)
         failure = np.where((failure == 0) & (force > self.max_force), 1, failure)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -43,7 +43,7 @@ def simulator(
     band: str,
     content: dict,
     clamps: Path | None,
-    device: str | Sequence[str] = "cpu",
+    device: str = "cpu",
 ) -> Callable[..., Launches]:
     """Function that launches draws, shape (N, 2) [m], in the simulator calibrated by a θ file.
 

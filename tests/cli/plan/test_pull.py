@@ -97,21 +97,15 @@ PLANS = st.fixed_dictionaries(
 ).map(whole)
 
 
-@given(
-    content=PLANS,
-    pulls=st.integers(1, 3),
-    duration=number(1, 120),
-    share=number(0.01, 0.9),
-    precondition=st.integers(0, 2),
-)
+@given(content=PLANS, pulls=st.integers(1, 3), duration=number(1, 120), share=number(0.01, 0.9))
 def test_each_of_several_pulls_is_the_first_again_and_finds_the_band_calm(
-    content, pulls, duration, share, precondition
+    content, pulls, duration, share
 ) -> None:
     """What the next pull's window shows begins when the last swing is over."""
     plan = PlanParams.model_validate(content)
     episode = with_(PARAMS.episode, "", duration=duration, tail=share * duration)
     rest = PARAMS.setup, episode, PARAMS.bands["band1"], AHEAD
-    single, way = (trajectory_of(plan, *rest, count, precondition) for count in (1, pulls))
+    single, way = (trajectory_of(plan, *rest, count) for count in (1, pulls))
     np.testing.assert_array_equal(way.times[: len(single.times)], single.times)
     starts = dict.fromkeys(("lead-in", "grasp", "pause", "release"), ())
     for phase, start in zip(way.phases, way.times, strict=False):
@@ -121,9 +115,7 @@ def test_each_of_several_pulls_is_the_first_again_and_finds_the_band_calm(
     lead, grasp, pause, release = map(np.array, starts.values())
     np.testing.assert_allclose(release - pause, release[0] - pause[0], atol=1e-6)
     held = (release - grasp)[1:]
-    stretched = single.until("release")
-    first = release[0] - grasp[0] - stretched["stretch"] - stretched["slacken"]
-    np.testing.assert_allclose(held, first, atol=1e-6)
+    np.testing.assert_allclose(held, release[0] - grasp[0], atol=1e-6)
     calm = release[1:] + episode.tail - episode.duration - release[:-1]
     calm = np.minimum(calm, grasp[1:] - LEAD - release[:-1])
     assert np.all(calm >= CALM - TICK) and np.all(lead[1:] + plan.lead_in <= grasp[1:] + TICK)
@@ -176,24 +168,3 @@ def test_a_dip_lets_the_band_back_and_draws_it_again() -> None:
     np.testing.assert_allclose(way.position(times)[:, 1], reached, atol=1e-12)
     np.testing.assert_allclose(way.position(times, 1), 0, atol=1e-12)
     assert set(way.openings[first : first + 8]) == {PARAMS.plan.gripper.closed}
-
-
-def test_preconditioning_is_full_pulls_of_the_first_grasp() -> None:
-    rest = PARAMS.setup, PARAMS.episode, PARAMS.bands["band1"], AHEAD
-    plain = trajectory_of(PARAMS.plan, *rest)
-    way = trajectory_of(PARAMS.plan, *rest, 2, 3)
-    names = [phase.name for phase in way.phases]
-    assert names[:11] == [
-        "lead-in",
-        "approach",
-        "grasp",
-        "lift",
-        *3 * ["stretch", "slacken"],
-        "pull",
-    ]
-    assert names.count("stretch") == 3
-    ends = np.array([phase.to for phase in way.phases[3:10]])
-    np.testing.assert_allclose(ends[:, 1], [0, -0.4, 0, -0.4, 0, -0.4, 0], atol=1e-12)
-    assert set(way.openings[3:11]) == {PARAMS.plan.gripper.closed}
-    after = [phase.name for phase in plain.phases[4:]]
-    assert names[10 : 10 + len(after)] == after

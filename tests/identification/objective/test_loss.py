@@ -98,8 +98,8 @@ def test_terms_of_a_gpu_are_those_of_the_cpu(chamfer: str) -> None:
     for name in TERMS:
         np.testing.assert_allclose(terms[name], expected[name], rtol=1e-4)
 
-    whole = Evaluator(episode, sling, loss, space, devices=("cuda:0",))(unit)
-    some = Evaluator(episode, sling, loss, space, devices=("cuda:0",))(unit[7:10])
+    whole = Evaluator(episode, sling, loss, space, device="cuda:0")(unit)
+    some = Evaluator(episode, sling, loss, space, device="cuda:0")(unit[7:10])
     for name in TERMS:  # simulated and compared there: no rollout depends on another
         np.testing.assert_array_equal(whole.terms[name][7:10], some.terms[name])
 

@@ -67,6 +67,16 @@ def test_bounds_are_the_boxs_the_methods_and_what_is_possible():
             assert values[name] == pytest.approx(getattr(getattr(box, name), side))
 
 
+def test_half_of_the_rubbers_do_not_soften():
+    """The rest of the prior is half of a Gaussian, cut off at 0.6."""
+    parts = np.full((2000, len(OURS.names)), np.linspace(0.0005, 0.9995, 2000)[:, None])
+    softening = OURS.quantiles(parts)[:, OURS.names.index("softening")]
+    some = softening[softening > 0]
+    assert len(some) / 2000 == pytest.approx(1 - 0.5 / norm.cdf(2.0), abs=0.002)
+    middle = 0.3 * norm.ppf((0.5 + norm.cdf(2.0)) / 2)
+    assert np.median(some) == pytest.approx(middle, rel=0.01)
+
+
 def test_a_start_outside_comes_to_the_bounds():
     five = [1e9, 0.47, 1.0, 0.7, 0.6]
     theta = Parameters.of("rubber", five, mooney_share=-5.0, relaxation=1.0)
@@ -90,15 +100,14 @@ def test_narrower_bounds_and_other_fixed_values_of_the_method_count():
 
 
 def test_priors_are_even_or_as_published():
-    """An even one's ends by hand; tan delta = pi eta of 9 rubbers in 10; half of a normal."""
+    """An even one's ends by hand; tan delta = pi eta of 9 rubbers in 10; a rectified Gaussian."""
     low, high = OURS.prior(0.9)
     place = OURS.names.index
     i = place("mooney_share")
-    assert (low[i], high[i]) == pytest.approx((-0.3 + 0.05 * 1.2, 0.9 - 0.05 * 1.2))
+    assert (low[i], high[i]) == pytest.approx((-1.0 + 0.05 * 1.9, 0.9 - 0.05 * 1.9))
     i = place("log_loss_factor")
     np.testing.assert_allclose(np.pi * np.exp([low[i], high[i]]), TAN_DELTA, rtol=1e-3)
     i = place("softening")
-    ends = norm.cdf([0.0, 2.0])  # of a half-normal of 0.3 that is cut off at 0.6
-    parts = ends[0] + np.array([0.05, 0.95]) * (ends[1] - ends[0])
-    np.testing.assert_allclose([low[i], high[i]], 0.3 * norm.ppf(parts), rtol=1e-6)
+    upper = 0.3 * norm.ppf(0.95 * norm.cdf(2.0))  # of a Gaussian of 0.3 that is cut off at 0.6
+    np.testing.assert_allclose([low[i], high[i]], [0.0, upper], rtol=1e-6)
     assert OURS.shows("youngs_modulus") == 0 and OURS.shows("dynamic_friction") is None

@@ -257,13 +257,20 @@ def test_without_a_recording_is_a_fit_without_it():
 
 def test_disagreement_is_one_of_alike_recordings_and_grows_with_a_shift():
     alike = [Curve(curve(TRUE)) for _ in range(3)]
-    assert birge_ratio(fit(alike, space(), START)) == 1.0
-    assert birge_ratio(fit(alike[:1], space(), START)) == 1.0
+    assert birge_ratio(fit(alike, space(), START), space()) == 1.0
+    assert birge_ratio(fit(alike[:1], space(), START), space()) == 1.0
     ratios = []
     for shift in (0.2, 0.4):
         other = [*alike[:2], Curve(curve(TRUE + shift * SIZE))]
-        ratios.append(birge_ratio(fit(other, space(), START)))
+        ratios.append(birge_ratio(fit(other, space(), START), space()))
     assert ratios[0] > 1.5 and ratios[1] == pytest.approx(2 * ratios[0], rel=0.1)
+
+
+def test_recordings_that_all_want_the_same_beyond_a_bound_do_not_disagree():
+    box = space(low=(0.0, 0.0, 5.0))  # of 3
+    result = fit([Curve(curve(TRUE)) for _ in range(3)], box, np.array([7.0, 7.0, 6.0]) * SIZE)
+    assert result.phi[2] == box.low[2] and result.gradient[2] < -10 / SIZE[2]
+    assert birge_ratio(result, box) == 1.0
 
 
 def test_disagreement_of_mere_noise_is_one_on_average():
@@ -277,5 +284,7 @@ def test_disagreement_of_mere_noise_is_one_on_average():
             total += expansion.gradient @ inverse @ expansion.gradient
             freedom += 3 * (1 - 1 / 3)
         squares.append(total / freedom)
-        assert birge_ratio(first) == pytest.approx(max(np.sqrt(squares[-1]), 1.0), rel=0.25)
+        assert birge_ratio(first, space()) == pytest.approx(
+            max(np.sqrt(squares[-1]), 1.0), rel=0.25
+        )
     assert np.mean(squares) == pytest.approx(1.0, abs=0.15)

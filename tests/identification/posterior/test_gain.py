@@ -52,21 +52,6 @@ def test_an_exact_arm_leaves_what_the_samples_spread(model) -> None:
     np.testing.assert_allclose(model.after(draw=0.0), expected, rtol=1e-9)
 
 
-def test_another_pull_counts_its_evidence_twice_and_the_prior_once() -> None:
-    """Against a fit to evidence that is there twice."""
-    design = RNG.normal(size=(30, 4)) * [5.0, 0.5, 0.001, 0.2]
-    explained = design.T @ design
-    empty = LandingModel(NAMES, np.eye(4), GRADIENT, np.zeros(2), np.ones(2))
-    prior = empty._prior()
-    assert prior[2, 2] == pytest.approx(0.015**-2)
-    model = LandingModel(NAMES, np.linalg.inv(explained + prior), GRADIENT, np.zeros(2), np.ones(2))
-    twice = np.vstack([design, design])
-    expected = np.linalg.inv(twice.T @ twice + prior)
-    np.testing.assert_allclose(model.pulled(), expected, rtol=1e-6, atol=1e-12)
-    half = np.linalg.inv(1.5 * explained + prior)  # of two, one more
-    np.testing.assert_allclose(model.pulled(2), half, rtol=1e-6, atol=1e-12)
-
-
 def test_a_model_is_read_off_samples() -> None:
     """Landings that are exactly linear in the logarithms are given back."""
     centre = np.array([2e5, 2e-3, 1.0, 0.5])

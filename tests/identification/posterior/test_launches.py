@@ -13,8 +13,8 @@ from sling2sim2real.identification.posterior.launches import (
     LaunchExpansion,
     LaunchLikelihood,
     Observed,
-    without_each,
 )
+from sling2sim2real.identification.posterior.sampling import without_each
 from sling2sim2real.simulator.model import LaunchHistory, LaunchSetup
 
 STEPS = np.array([1e-3, 1e-3])
@@ -37,6 +37,19 @@ def closed(monkeypatch: pytest.MonkeyPatch) -> None:
 def expanded(*observed: Observed, phi=(0.0, 0.0)) -> LaunchExpansion:
     likelihood = LaunchLikelihood(observed, None, FORGETFUL)
     return likelihood.expand(lambda phi: phi, np.array(phi), STEPS)
+
+
+def scored(
+    launches: LaunchExpansion, prior: np.ndarray, pull=0.0, *, low=-9.0, widening=1.0
+) -> np.ndarray:
+    """Scores without each, of a mode at 0 of launches and of others, which pull it [precision]."""
+    hessian = prior + launches.landed.hessian / widening**2
+    gradient = pull + launches.landed.gradient / widening**2
+    density = SimpleNamespace(
+        launches=launches, phi=np.zeros(2), hessian=hessian, gradient=gradient
+    )
+    bounds = SimpleNamespace(low=np.array([low, -9.0]), high=np.array([9.0, 9.0]))
+    return without_each(density, bounds, widening)
 
 
 def test_the_update_is_the_linear_gaussian_one() -> None:
@@ -158,21 +171,28 @@ def test_a_launch_is_held_against_what_all_else_predicts() -> None:
     near, far = Observed((-0.5, -0.2), 0.001, 0.34), Observed((-0.6, -0.1), 0.0, 0.4)
     prior = np.diag([40.0, 250.0])
     both = expanded(near, far)
-    scores = without_each(both, prior + both.landed.hessian, both.landed.gradient)
+    scores = scored(both, prior)
     for index, (observation, rest) in enumerate(((near, far), (far, near))):
         others, alone = expanded(rest), expanded(observation)
         covariance = np.linalg.inv(prior + others.landed.hessian)
         slope = alone.design[:, 0]
         predicted = alone.gap[0] - slope @ covariance @ others.landed.gradient
-        assert scores[index] == pytest.approx(
-            predicted / np.sqrt(1 + slope @ covariance @ slope), rel=1e-6
-        )
-    wider = without_each(
-        both, prior + both.landed.hessian / 9, both.landed.gradient / 9, widening=3.0
-    )
-    assert np.all(np.abs(wider) < np.abs(scores))
+        expected = predicted / np.sqrt(1 + slope @ covariance @ slope)
+        assert scores[index] == pytest.approx(expected, rel=0.05)
+    assert np.all(np.abs(scored(both, prior, widening=3.0)) < np.abs(scores))
     failed = expanded(near, Observed((-0.5, 0.2), 0.001, 0.31))
-    assert np.isnan(without_each(failed, prior + failed.landed.hessian, failed.landed.gradient)[1])
+    assert np.isnan(scored(failed, prior)[1])
+
+
+def test_a_launch_is_not_accused_by_values_out_of_bounds() -> None:
+    """Without it the others would have a far below 0, where it must not be: a lies at 0 instead."""
+    prior, pull = np.diag([400.0, 1e8]), np.array([-80.0, 0.0])  # to a = -0.2 within 0.05
+    one = expanded(Observed((-0.5, -0.2), 0.001, 0.30))
+    free, bounded = (scored(one, prior, pull, low=low)[0] for low in (-9.0, 0.0))
+    spread = np.hypot(1, one.design[0, 0] / 20)
+    expected = (one.gap[0] + 0.2 * one.design[0, 0]) / spread
+    assert free == pytest.approx(expected, rel=0.05) and free > 2
+    assert abs(bounded) < 1
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ def space(low=(0.0, 0.0, 0.0), high=(50.0, 50.0, 50.0), expected=0.0, spread=np.
     """Three coordinates, bounds and priors in steps of their finite differences."""
     low, high = (SIZE * ends for ends in (low, high))
     precision = np.broadcast_to((spread * SIZE) ** -2.0, 3)
-    return Coordinates("rubber", NAMES, low, high, {}, 1.0, expected * SIZE, precision)
+    return Coordinates("rubber", NAMES, low, high, {}, 1.0, expected * SIZE, precision, low)
 
 
 def curve(phi: np.ndarray) -> np.ndarray:

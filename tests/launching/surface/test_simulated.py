@@ -4,19 +4,16 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE
 from sling2sim2real.launching.surface.simulated import SimulatedLandings
 from tests.policy import toy
 
-BOX = {"draw_y": toy.DRAW_Y, "draw_z": toy.DRAW_Z, "size": (9, 7)}
 DRAWS = np.random.default_rng(0).uniform((-0.45, -0.3), (-0.25, -0.1), (200, 2))
 
 
 def source(launch=toy.launch, max_force: float = 15.0) -> SimulatedLandings:
-    return SimulatedLandings(
-        launch, LandingMap.simulate(toy.launch, **BOX, max_force=max_force).surface
-    )
+    setup = SimpleNamespace(draw_y=toy.DRAW_Y, draw_z=toy.DRAW_Z, max_force=max_force)
+    return SimulatedLandings(launch, setup)
 
 
 def test_it_says_what_the_simulator_does() -> None:

@@ -55,7 +55,7 @@ ADDED = {
     f" --base-to-camera={POSE}, --camera-to-fork=0,0,0.9,1,0,0,0, --floor=-0.1, --draw-y=-0.4,-0.3,"
     " --draw-z=-0.2,-0.1, --tool=0.7,0,0,0.05, --topic wrench=/ft, --json",
     PLAN: "--mass 0.05, --diameter 0.02, --rest-length 0.5, --draw=-0.30,-0.1,"
-    " --recording none.mcap, --pull paper, --pulls 2, --out there, --rate 50,"
+    " --pull paper, --pulls 2, --out there, --rate 50,"
     " --json",
     LAUNCH: "--theta none.json, --json",
     "aim bands/toy --target 19": "--force, --json",

@@ -14,6 +14,10 @@ from validation.projects import DEFAULTS, environment, run_of, wait
 
 # What params.yaml has of a band of one's own.
 BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
+STAGES = {  # of dvc.yaml, without what they are for each of
+    name: stage.get("do", stage)
+    for name, stage in YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"].items()
+}
 
 
 def python(*arguments: str | Path, folder: Path = ROOT, **more: str) -> subprocess.CompletedProcess:

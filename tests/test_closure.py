@@ -11,11 +11,10 @@ import re
 
 import grimp
 import pytest
-from ruamel.yaml import YAML
 
 from pipeline.band_folder import KEPT
 from sling2sim2real.settings.identification import OWN, SEARCHES
-from tests.project import ROOT
+from tests.project import ROOT, STAGES
 
 PACKAGES = ("pipeline", "rig", "sling2sim2real", "stages", "validation")
 GRAPH = grimp.build_graph(*PACKAGES, exclude_type_checking_imports=True, cache_dir=None)
@@ -26,10 +25,6 @@ SEARCH = "sling2sim2real/identification/searches/{}.py"
 BY_NAME = {"history": SEARCH.format("de"), "search": SEARCH.format("${item.search}")}
 RIG_SEEN_BY = ("rig.", "stages.record", "stages.floor", "stages.trials", "validation.campaigns.")
 ORACLE_SEEN_BY = ("rig.oracle.", "stages.floor", "validation.campaigns.")
-STAGES = {
-    name: stage.get("do", stage)
-    for name, stage in YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"].items()
-}
 
 
 def parents(module: str) -> list[str]:

@@ -15,12 +15,11 @@ import networkx
 import pytest
 from numba.core.caching import UserProvidedCacheLocator
 from ruamel.yaml import YAML
-from tools.closure import stages
 
 from pipeline.flow.dvc import graph_of
 from rig.physics import compiled
 from sling2sim2real.base.launches_file import write_launches
-from tests.project import BAND, ROOT, contents, until
+from tests.project import BAND, ROOT, STAGES, contents, until
 from validation.projects import TINY, MarkedRun, ProjectCopy, copy_project, run_of
 
 pytestmark = pytest.mark.slow
@@ -156,7 +155,7 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
         item = run["pairs"].get(key) or run["recordings"].get(key, {})
         marks = {f"${{item.{field}}}": value for field, value in item.items()}
         marks |= {"${item}": key, "${run.main}": OURS}
-        listed = [_filled(place, marks) for place in stages()[step].get("params", [])]
+        listed = [_filled(place, marks) for place in STAGES[step].get("params", [])]
         notes = list((project.folder.parent / "audit").glob(f"{name}.*.json"))
         assert notes, f"{name} left no note of what it read"
         read = {key for note in notes for key in json.loads(note.read_text())} - {"run"}
@@ -168,7 +167,7 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
         assert not unlisted, f"{name} reads parameters that dvc.yaml does not list"
         unread = {
             place
-            for place in stages()[step].get("params", [])
+            for place in STAGES[step].get("params", [])
             if not any(covers(_filled(place, marks), read_key) for read_key in read)
         }
         # Pairs share a list: what none of them reads is idle. Some is of other recordings, of a

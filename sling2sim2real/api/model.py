@@ -18,7 +18,6 @@ from sling2sim2real.base.schema import explained, read_json
 from sling2sim2real.identification.results.theta import Mounting, ThetaFile, parameters_of
 from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.settings import Settings
-from sling2sim2real.settings.identification import LAWS
 from sling2sim2real.settings.lab import BandParams
 from sling2sim2real.simulator.launch import Launches
 from sling2sim2real.simulator.launch import launch as launch_many
@@ -26,7 +25,7 @@ from sling2sim2real.simulator.model import ClampedBand, LaunchHistory, LaunchSet
 from sling2sim2real.simulator.parameters import THETA, Parameters, names_of
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN, RUBBER
 
-ADDED = tuple(LAWS[RUBBER])  # parameters that the law rubber has beside the five
+ADDED = {row.name: row.default for row in parameters(RUBBER) if row.law}  # what the law adds
 
 
 @dataclass(frozen=True)
@@ -118,10 +117,10 @@ class Theta(_Values):
             object.__setattr__(self, "law", RUBBER if of_rubber else NEO_HOOKEAN)
         if self.flow and self.log_flow_rate is None:
             raise UserError("theta.log_flow_rate: must be given beside flow")
-        if self.law == RUBBER:  # what is not given of it is none
-            for name in ADDED:
+        if self.law == RUBBER:
+            for name, default in ADDED.items():
                 if getattr(self, name) is None:
-                    object.__setattr__(self, name, 0.0)
+                    object.__setattr__(self, name, default)
         try:
             ThetaFile.model_validate(self.content("band", LaunchHistory(1.0, 0.0)))
         except ValidationError as error:

@@ -130,10 +130,10 @@ def _cautions(episodes: Sequence[Episode]) -> list[tuple[str, str]]:
 
 def _odd(recordings: list[dict]) -> str:
     """File and pull that all others predict worst; "" of fewer than two."""
-    predicted = [recording for recording in recordings if "without_it" in recording]
+    predicted = [recording for recording in recordings if "misfit_without" in recording]
     if not predicted:
         return ""
-    source = max(predicted, key=lambda recording: recording["without_it"]["misfit"])["source"]
+    source = max(predicted, key=lambda recording: recording["misfit_without"])["source"]
     return f"pull {source.get('pull', 1)} of {as_code(source.get('file', '?'))}"
 
 

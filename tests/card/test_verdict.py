@@ -165,7 +165,7 @@ def test_findings_see_a_bad_score_a_side_and_odd_evidence(summary) -> None:
     launches = [{"left": None, "z_without_it": None}, {"left": -0.07, "z_without_it": -1.8}]
     recordings = [
         {"force_rms": force, "held_rms": 0, "recoil_rms": 0, "pictures": []}
-        | {"source": {"file": f"{force}.mcap", "pull": 3}, "without_it": {"misfit": force}}
+        | {"source": {"file": f"{force}.mcap", "pull": 3}, "misfit_without": force}
         for force in (0.1, 0.3)
     ]
     confidence = summary.confidence | {"launches": launches, "recordings": recordings}

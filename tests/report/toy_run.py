@@ -138,9 +138,8 @@ def _confidence(band: str) -> dict:
         return known | {"settled": False, "steps": 30}
     if band == BAND:
         return confidence()
-    moved = {"mooney_share": 0.4, "log_loss_factor": -1.26}
     second = known["recordings"][0] | {"source": {"file": "a|b`c*.mcap", "pull": 2}}
-    second |= {"pictures": [0.0123, 0.0456], "without_it": {"misfit": 3.21, "moved": moved}}
+    second |= {"pictures": [0.0123, 0.0456], "misfit_without": 3.21}
     evidence = [
         {"draw": [-0.3, -0.15], "landing": 1.9, "left": 0.021, "z_without_it": 0.5},
         {"draw": [-0.3, -0.16], "landing": 2.0, "left": None, "z_without_it": None},

@@ -4,14 +4,13 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
-from tools.closure import stages
 
 from rig.recorder.interaction import Interaction
 from sling2sim2real.identification.objective.loss import EpisodeLoss
 from sling2sim2real.recording.build import build_episodes
 from sling2sim2real.simulator.model import ClampedBand
+from tests.project import STAGES
 
-STAGES = stages()
 WORLD = {"record", "trials", "floor"}
 SHOWN = ("data/trials", "data/floor")  # what came of launches on the rig
 JUDGES = {"trials", "report", "card"}

@@ -148,24 +148,20 @@ def _recording(density: Identified, number: int) -> dict:
     entry = {f"{part}_rms": expansion.rms(part) for part in ("force", "held", "recoil")}
     entry |= {"pictures": expansion.pictures, "source": episode.metadata.get("input", {})}
     if len(density.recordings) > 1:
-        entry["without_it"] = leave_one_out(density, number)
+        entry["misfit_without"] = misfit_without(density, number)
     return entry
 
 
-def leave_one_out(density: Identified, number: int) -> dict:
-    """How the mode of all other evidence predicts the one left out, by their quadratics."""
+def misfit_without(density: Identified, number: int) -> float:
+    """How much worse the mode of all other evidence fits a recording, by their quadratics."""
     expansion, phi = density.fit.expansions[number], density.fit.phi
     hessian = density.fit.hessian - expansion.hessian
     gradient = density.fit.gradient - expansion.gradient
     ends = density.coordinates.low - phi - 1e-12, density.coordinates.high - phi + 1e-12
-    root = np.linalg.cholesky(hessian)
+    ridge = 1e-9 * np.diag(density.fit.hessian)  # where the others tell nothing
+    root = np.linalg.cholesky(hessian + np.diag(ridge))
     moved = lsq_linear(root.T, np.linalg.solve(root, gradient), ends, method="bvls").x
-    worse = moved @ expansion.hessian @ moved - 2 * expansion.gradient @ moved
-    spread = np.sqrt(np.diag(np.linalg.inv(hessian)))
-    return {
-        "misfit": float(worse),
-        "moved": dict(zip(density.coordinates.names, (moved / spread).tolist(), strict=True)),
-    }
+    return float(moved @ expansion.hessian @ moved - 2 * expansion.gradient @ moved)
 
 
 def _launches(density: Identified) -> list[dict]:

@@ -93,13 +93,6 @@ class EpisodeSource(JsonRecord):
     pull: int = 1
 
 
-class WithoutRecording(JsonRecord):
-    """What all other evidence says: by how many standard deviations coordinates move."""
-
-    misfit: float
-    moved: Annotated[dict[Name, float], FILLED]
-
-
 class RecordingResiduals(JsonRecord):
     """Root mean squares [N, m, m]; seconds after the release of the pictures of the recoil."""
 
@@ -108,7 +101,7 @@ class RecordingResiduals(JsonRecord):
     recoil_rms: float
     pictures: list[float]
     source: EpisodeSource = EpisodeSource()
-    without_it: WithoutRecording | None = None
+    misfit_without: float | None = None
 
 
 class LaunchResidual(JsonRecord):

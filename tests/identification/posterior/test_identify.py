@@ -118,7 +118,7 @@ def test_samples_lie_on_both_sides_of_the_truth_and_two_recordings_narrow_them(f
 def test_alike_recordings_agree(both):
     summary = confidence.confidence(both)
     assert summary["disagreement"] == both.birge == 1.0
-    assert len(summary["recordings"]) == 2 and "without_it" in summary["recordings"][0]
+    assert len(summary["recordings"]) == 2 and "misfit_without" in summary["recordings"][0]
 
 
 def test_what_is_written_is_a_theta_file(first, tmp_path):

@@ -65,7 +65,6 @@ def test_a_command_line_that_makes_no_sense(refused) -> None:
         ("fit new.mcap --mass 40.8", "looks like grams (0.0408)"),
         ("check a.mcap --rest-length 52", "argument --rest-length: must be in metres, from 0.05"),
         ("check a.mcap --diameter 10", "argument --diameter: must be in metres, from 0.0005"),
-        ("check a.mcap --frames", "argument --frames: used with --json alone"),
         ("launch b --draw=-2.30,0", "from 0.05 to 2, got 2.3"),
         ("observe b --draw=-0.3,-0.2 --landing 221", "looks like centimetres (2.21)"),
         ("plan b --rate 1e9", "argument --rate: must be in hertz, from 1 to 10000"),

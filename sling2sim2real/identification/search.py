@@ -9,7 +9,6 @@ searches/, and settings/identification.py names them; params.yaml names one of a
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from typing import Protocol
 
@@ -133,9 +132,10 @@ def explore(
     settings = {"rollouts": rollouts, "seed": optimizer.seed, "population": optimizer.population}
     if name in ("multistart", "de"):
         settings |= {"mutation": optimizer.mutation, "recombination": optimizer.recombination}
-    call = bound(search, name, len(box.free), **settings | method_params.settings)
+    settings |= method_params.settings
+    started = lambda losses_of: search(losses_of, len(box.free), **settings)  # noqa: E731
     try:
-        run(call, evaluate, evaluations, phase=phase, rollouts=rollouts, box=box)
+        run(started, evaluate, evaluations, phase=phase, rollouts=rollouts, box=box)
     except (TypeError, ValueError) as error:
         if len(evaluations.total):
             raise
@@ -161,20 +161,6 @@ def function_of(name: str) -> tuple[str, Callable[..., None]]:
         return phase, imported(place)
     except Exception as error:  # a module of the user's may raise anything
         raise _refusal(name, f"cannot be imported ({type(error).__name__}: {error})") from error
-
-
-def bound(
-    search: Callable[..., None], name: str, dimension: int, /, **settings
-) -> Callable[[Evaluate], None]:
-    """The search with its settings. Raises UserError where it takes no such ones."""
-    try:
-        inspect.signature(search).bind(None, dimension, **settings)
-    except (TypeError, ValueError) as error:
-        names = ", ".join(settings)
-        raise _refusal(
-            name, f"cannot be called as function(evaluate, dimension, {names}): {error}"
-        ) from error
-    return lambda evaluate: search(evaluate, dimension, **settings)
 
 
 def _refusal(name: str, what: str) -> UserError:

@@ -10,7 +10,7 @@ from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluation
 from sling2sim2real.identification.objective.loss import TERMS
 from sling2sim2real.identification.results.evaluations import Evaluations
-from sling2sim2real.identification.search import BudgetSpent, bound, function_of, run
+from sling2sim2real.identification.search import BudgetSpent, function_of, run
 from sling2sim2real.identification.searches.cma_es import cma_es
 from sling2sim2real.identification.searches.regions import Region, find_regions
 
@@ -112,7 +112,8 @@ def alone(
     evaluations = Evaluations("toy", box.names)
     settings |= {"seed": optimizer.seed, "population": optimizer.population}
     phase, function = function_of(name)
-    search = bound(function, name, len(box.free), rollouts=rollouts, **settings)
+    settings |= {"rollouts": rollouts}
+    search = lambda losses_of: function(losses_of, len(box.free), **settings)  # noqa: E731
     run(search, evaluate, evaluations, phase=phase, rollouts=rollouts, box=box)
     return evaluations
 

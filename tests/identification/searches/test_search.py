@@ -208,7 +208,7 @@ REFUSED = (
     ),
     (f"{OWN}:flat", {"batch": 1}, "shape (N, 4), and got shape (1, 5)"),
     (f"{OWN}:words", {}, "and got no array of numbers"),
-    ("math:hypot", {}, "cannot be called as function(evaluate, dimension, rollouts, seed"),
+    ("math:hypot", {}, "does not take its settings: math.hypot() takes no keyword"),
     (f"{OWN}:random_search", {"rate": 1.0}, "got an unexpected keyword argument 'rate'"),
     ("de", {"dimension": 3}, "multiple values for argument 'dimension'"),
     ("de", {"mutation": 7.0}, "does not take its settings: "),

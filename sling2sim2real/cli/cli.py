@@ -102,16 +102,13 @@ def fit(arguments: argparse.Namespace) -> Done:
     flag("--pull", type=kinds.count, metavar="N", help="which pull; default: the first usable one"),
     flag("--sheet", type=Path, metavar="OUT.png", help="draw six moments, force and coverage"),
     flag("--pictures", type=Path, metavar="FOLDER", help="write the pictures to mask elsewhere"),
-    flag("--frames", action="store_true", help="with --json, also a row for each picture"),
     JSON,
 )
 def check(arguments: argparse.Namespace) -> Done:
     from sling2sim2real.cli.preflight.command import check, check_band
 
-    if arguments.frames and not arguments.json:
-        arguments.refuse("argument --frames: used with --json alone")
-    wanted = {name: getattr(arguments, name) for name in ("sheet", "pictures", "pull")}
-    options = wanted | {"as_json": arguments.json, "frames": arguments.frames}
+    options = {name: getattr(arguments, name) for name in ("sheet", "pictures", "pull")}
+    options["as_json"] = arguments.json
     from sling2sim2real.api.band_folder import BandFolder
 
     if folder := BandFolder.find(arguments.recording):

@@ -20,8 +20,6 @@ OF_DVC = "DVC_STAGE"  # in the environment of what DVC runs
 OF_FLOW = "SLING_FLOW"  # process id of the `sling` command that started that DVC
 OF_EXPERIMENT = "DVC_EXP_NAME"  # the same, of `dvc exp run`
 GRACE = 5.0  # s from the interrupt to the end
-MAKERS = {"raw": "record", "episodes": "episode", "policies": "policy"}  # others: as the folder
-LAST_OF = {"multistart": "cma", "posterior": "posterior", "search": "search"}
 
 
 def arguments(*names: str) -> list[str]:
@@ -107,30 +105,9 @@ def _end_with_dvc() -> None:
 
 def remedy(error: NotMade) -> str:
     """Describe how a user gets a file of data/, or gets it anew; "" of any other file."""
-    parts = error.path.with_suffix("").parts
-    after = parts[::-1].index("data") if "data" in parts else 0
-    run = load().run
-    match parts[len(parts) - after :]:
-        case "launches", *_:
-            return "a CSV with the header draw_y,draw_z,error,landing,use will do"
-        case "raw" | "episodes" | "clamps" as folder, band, recording, *_:
-            key, entries = (
-                Recording.model_construct(band=band, recording=recording).key,
-                run.recordings,
-            )
-        case "floor" as folder, key, *_:
-            entries = run.floors
-        case folder, key, *_:
-            entries = run.pairs
-        case _:
-            return ""
-    if folder == "raw" and key not in run.rig:
-        return "put MCAP files there"
-    if key not in entries:
-        return f"no entry of `run` in params.yaml makes {key}"
-    step = MAKERS.get(folder, folder)
-    if folder in ("evaluations", "confidence"):
-        step = next(step for kind, step in LAST_OF.items() if key in getattr(run, kind))
-    if error.problem != "missing":
-        return f"`dvc repro --force {step}@{key}` makes it anew"
-    return f"`dvc repro {step}@{key}` makes it"
+    if "data" not in error.path.parts[:-1]:
+        return ""
+    if "launches" in error.path.parts:
+        return "a CSV with the header draw_y,draw_z,error,landing,use will do"
+    yours = "; of a band of yours, put MCAP files there" if "raw" in error.path.parts else ""
+    return f"`dvc repro` makes it{' anew' * (error.problem != 'missing')}{yours}"

@@ -40,7 +40,7 @@ BLOCKS: dict[str, tuple[str, Callable[[], list[str]]]] = {  # by page: name of i
     "docs/identification.md": (
         "landings",
         lambda: landings.table(
-            {name: read(ROOT / landings.report_of(name)) for name in ("bands", "sealed")}
+            {name: read(ROOT / landings.report_of(name)) for name in ("sealed",)}
         ),
     ),
     "docs/paper.md": ("ablations", lambda: ablations.table(read(ROOT / ablations.LARGE))),

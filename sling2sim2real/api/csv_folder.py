@@ -92,7 +92,9 @@ def _about(path: Path) -> EpisodeFile:
 def _table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame:
     """Columns time, `columns` and maybe opening, all finite, time increasing. Raises UserError."""
     try:
-        table = pd.read_csv(path, dtype=str, skipinitialspace=True, skip_blank_lines=False)
+        table = pd.read_csv(
+            path, dtype=str, skipinitialspace=True, skip_blank_lines=False, keep_default_na=False
+        ).fillna("")
     except (OSError, ValueError) as error:  # pandas' own errors are ValueErrors
         message = getattr(error, "strerror", None) or error
         raise UserError(f"{path}: cannot be read ({one_line(message)[:120]})") from error
@@ -101,7 +103,7 @@ def _table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame:
     missing = [name for name in wanted if list(table.columns).count(name) != 1]
     if missing:
         raise UserError(f"{path}: must have one column each of {', '.join(wanted)}; not {missing}")
-    while len(table) and table.iloc[-1].isna().all():  # empty lines at the end
+    while len(table) and (table.iloc[-1] == "").all():  # empty lines at the end
         table = table.iloc[:-1]
     numbers = table[wanted].apply(pd.to_numeric, errors="coerce")
     wrong = ~np.isfinite(numbers.to_numpy(float))

@@ -15,15 +15,7 @@ from pathlib import Path
 from sling2sim2real.base.errors import UserError, refused
 
 ROOM = 1_000_000  # bytes at least, with which DVC, Prefect and their locks can write
-WRITTEN = (  # by stages and by DVC, `*` for a band; recordings lie where they lie
-    "dvc.lock",
-    ".dvc/tmp/*",
-    ".dvc/cache/files/md5",
-    "data/[!r]*/*",
-    "data/[!r]*",
-    "reports/bands/*",
-    "reports",
-)
+WRITTEN = ("dvc.lock", ".dvc/tmp", ".dvc/cache", "data", "reports")  # by stages and by DVC
 
 
 def expect_room(folder: Path) -> None:
@@ -55,8 +47,7 @@ def expect_writable(*paths: Path) -> None:
 
 def expect_ready(root: Path) -> None:
     """Have DVC work in a project. Raises UserError where stages could not write what they make."""
-    written = [path for pattern in WRITTEN for path in sorted(root.glob(pattern))]
-    expect_writable(root, root / ".dvc" / "tmp", *written)
+    expect_writable(root, *(root / name for name in WRITTEN))
     expect_room(root)
     folders = (root.resolve(), *root.resolve().parents)
     with_git = any((folder / ".git").exists() for folder in folders)

@@ -102,16 +102,13 @@ def fit(arguments: argparse.Namespace) -> Done:
     flag("--pull", type=kinds.count, metavar="N", help="which pull; default: the first usable one"),
     flag("--sheet", type=Path, metavar="OUT.png", help="draw six moments, force and coverage"),
     flag("--pictures", type=Path, metavar="FOLDER", help="write the pictures to mask elsewhere"),
-    flag("--frames", action="store_true", help="with --json, also a row for each picture"),
     JSON,
 )
 def check(arguments: argparse.Namespace) -> Done:
     from sling2sim2real.cli.preflight.command import check, check_band
 
-    if arguments.frames and not arguments.json:
-        arguments.refuse("argument --frames: used with --json alone")
-    wanted = {name: getattr(arguments, name) for name in ("sheet", "pictures", "pull")}
-    options = wanted | {"as_json": arguments.json, "frames": arguments.frames}
+    options = {name: getattr(arguments, name) for name in ("sheet", "pictures", "pull")}
+    options["as_json"] = arguments.json
     from sling2sim2real.api.band_folder import BandFolder
 
     if folder := BandFolder.find(arguments.recording):
@@ -145,13 +142,10 @@ def setup(arguments: argparse.Namespace) -> Done:
 
 @command(
     "plan the pull that a robot is to record, and check it against limits",
-    "--mass 0.0408 --diameter 0.010 --rest-length 0.52 --recording earlier.mcap",
+    "--mass 0.0408 --diameter 0.010 --rest-length 0.52",
     flag("band", type=Path, nargs="?", metavar="BAND", help="its folder; or sizes of one to come"),
     *SIZES,
     flag("--draw", type=kinds.draw, metavar="Y,Z", help="in metres, frame O; default plan.draw"),
-    flag(
-        "--recording", type=Path, metavar="FILE.mcap", help="for base and force; default: its own"
-    ),
     flag(
         "--pull",
         choices=kinds.PULLS,
@@ -167,11 +161,9 @@ def plan(arguments: argparse.Namespace) -> Done:
     from sling2sim2real.cli.plan.plan import known_band, plan_recording
 
     known = known_band(arguments.band, sizes_of(arguments))
-    recordings = [arguments.recording] if arguments.recording else known.recordings
     plan = plan_recording(
         known.settings,
         known.band,
-        recordings=recordings,
         found=known.found,
         draw=arguments.draw,
         pull=arguments.pull,

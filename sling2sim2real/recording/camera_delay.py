@@ -16,21 +16,17 @@ from scipy.spatial.transform import Rotation
 from sling2sim2real.recording.events import Pull
 from sling2sim2real.recording.force import LONGEST
 from sling2sim2real.recording.motion import interpolated
+from sling2sim2real.recording.release_pictures import points_near
 
 FEWEST = 100  # points of a body that is seen
 NEIGHBOURS = 12  # by which the normal at a point is told
 FLAT = 0.1  # of the variances of neighbours across and along a surface
-NEAREST = (
-    0.02,
-    0.01,
-    0.004,
-    0.004,
-    0.004,
-)  # m between points that are laid on each other, by round
+NEAREST = 0.02, 0.01, 0.004, 0.004, 0.004  # m between points laid on each other, by round
 BLOCKS = 8  # of time, for errors by leaving one out
 FRAMES = 144  # pictures looked at
 REST = 4  # pictures with the slowest hand, at each end of the way
 PALM, REACH = 0.08, 0.13  # m: what is looked at around a point so far behind the tool centre point
+ROOM = 1.3  # times REACH, in which points of the hand are kept: the pose may be late
 FINGERTIPS = 0.015  # m behind the tool centre point that are left to the band
 POINTS = 500  # of the hand in a picture
 SCATTER = 0.0003  # m from picture to picture, against which the next is weighed
@@ -94,22 +90,12 @@ def _hand(pull: Pull, rays: np.ndarray, k: int, time: float) -> np.ndarray:
     Args:
         rays: Of the depth camera, shape (H, W, 3).
     """
-    camera, nothing = pull.recording.depth_camera, np.zeros((0, 3))
-    pose, motion = pull.geometry.camera, pull.motion
-    palm = motion.position(time) + motion.orientation(time).apply([0, 0, -PALM])
-    middle = pose.inverse().apply(palm)
-    if middle[2] < 2 * REACH:
-        return nothing
-    half = 1.3 * REACH * np.diag(camera.matrix)[:2] / middle[2]
-    pixel = camera.project(middle[None])[0]
-    window = camera.window(pixel - half, pixel + half)
     depth = pull.recording.depth_picture(k)
     if depth is None:
-        return nothing
-    depth = depth[window]
-    points = pose.apply((rays[window] * depth[..., None])[depth > 0])
-    near = np.linalg.norm(points - palm, axis=1) < 1.3 * REACH
-    return points[near].astype(float)
+        return np.zeros((0, 3))
+    palm = pull.motion.position(time) + pull.motion.orientation(time).apply([0, 0, -PALM])
+    points = points_near(pull, rays, depth, palm[None], ROOM * REACH)
+    return points[np.linalg.norm(points - palm, axis=1) < ROOM * REACH]
 
 
 def _behind(points: np.ndarray) -> np.ndarray:

@@ -43,14 +43,7 @@ LATE = 0.02  # s: a filter that delays by more makes the whole force late
 ASTRAY = np.deg2rad(7.0)  # beyond SURE: too far to be used
 RUBBERS = (0.06e6, 12e6)  # Pa: Young's moduli of rubbers
 NO_RUBBER = (0.01e6, 50e6)  # Pa: those of none
-LIGHT, HEAVY = 0.25, 1.4  # of the band's weight on the hand: too little, too much
-UNITS = {  # newtons in one
-    "millinewtons": 1e-3,
-    "centinewtons or grams-force": 9.81e-3,
-    "pounds-force": 4.45,
-    "kilograms-force": 9.81,
-    "kilonewtons": 1e3,
-}
+LIGHT = 0.25  # of the band's weight on the hand: too little
 PAUSE, SETTLED, STILL = 1.0, 0.02, 0.005  # s, of the held force, m/s
 COVERAGE = {"hanging": 0.7, "drawn": 0.9, "recoil": 0.6, "swing": 0.7}
 SEEN_AS = {"hanging": "hangs", "drawn": "is drawn", "recoil": "recoils", "swing": "swings"}
@@ -550,13 +543,6 @@ def _of_hold(hold: Hold, weighed: bool) -> Iterator[Finding]:
         shown = f"{modulus / 1e6:.3g} MPa" if modulus >= 1e5 else f"{modulus / 1e3:.3g} kPa"
         what = f"a band that holds {hold.size:.3g} N here would be of {shown}"
         what += f" and weigh {weight:.2g} times its mass on the hand" if weight else ""
-        fitting = [
-            unit
-            for unit, newtons in UNITS.items()
-            if RUBBERS[0] < modulus * newtons < RUBBERS[1]
-            and (weight is None or LIGHT < weight * newtons < HEAVY)
-        ]
-        what += f": the force seems to be in {' or '.join(fitting)}" if fitting else ""
         yield found("units", what, refused=not NO_RUBBER[0] < modulus < NO_RUBBER[1])
     if not weighed:  # its weight turns the force by degrees
         return

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.machine import cores
@@ -47,15 +47,7 @@ class Clouds:
         return sum(not len(points) for points in self.points)
 
 
-class Mask(Protocol):
-    """A backend that has learned from a view."""
-
-    def mask(self, frame: RgbdFrame) -> np.ndarray:
-        """Pixels of the band, shape (H, W), bool."""
-        ...
-
-
-def masker(name: str, view: View) -> Mask:
+def masker(name: str, view: View) -> RidgeMask | FolderMask:
     """The backend of params.cloud.mask. Raises UserError where its masks are missing."""
     return {"opencv": RidgeMask, "folder": FolderMask}[name](view)
 
@@ -122,26 +114,28 @@ def sample(points: np.ndarray, cloud: CloudParams, density: float = np.inf) -> n
         density: Points that a metre of the band may have; of a thin or far band no more neighbours
             are asked for than it can have.
     """
-    import open3d
-
     expected = ALONE * density * 2 * cloud.radius
     neighbors = int(np.clip(expected, 1, cloud.radius_neighbors))
-
     if len(points) <= cloud.statistical_neighbors:
         return np.zeros((0, 3), np.float32)
-
-    def sampled(dense):
-        more = len(dense.points) > cloud.points
-        return dense.farthest_point_down_sample(cloud.points) if more else dense
-
-    dense = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points.astype(np.float64)))
+    points = points.astype(np.float64)
     if cloud.sampling == "before_filters":
-        dense = sampled(dense)
-    dense, _ = dense.remove_statistical_outlier(
-        cloud.statistical_neighbors, cloud.statistical_ratio
-    )
-    dense, _ = dense.remove_radius_outlier(neighbors, cloud.radius)
-    return np.asarray(sampled(dense).points, np.float32).reshape(-1, 3)
+        points = _spread(points, cloud.points)
+    nearest = np.arange(1, min(cloud.statistical_neighbors, len(points)) + 1)
+    mean = cKDTree(points).query(points, nearest)[0].mean(axis=1)
+    points = points[mean < mean.mean() + cloud.statistical_ratio * mean.std(ddof=1)]
+    near = cKDTree(points).query_ball_point(points, cloud.radius, return_length=True)
+    return _spread(points[near > neighbors], cloud.points).astype(np.float32)
+
+
+def _spread(points: np.ndarray, most: int) -> np.ndarray:
+    """At most so many of some points (S, 3), by farthest point sampling."""
+    if len(points) <= most:
+        return points
+    import open3d  # takes 0.2 GB
+
+    dense = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
+    return np.asarray(dense.farthest_point_down_sample(most).points)
 
 
 COVERED = 1.5  # diameters from a point of the cloud to the part of the band that it stands for

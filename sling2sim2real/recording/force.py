@@ -111,8 +111,9 @@ def _sign(hold: np.ndarray, hand: np.ndarray) -> float:
     angle = np.arccos(np.clip(abs(cosine), 0, 1))
     if angle > MOST_ASKEW:
         raise UserError(
-            f"the held force points {np.degrees(angle):.0f} degrees away from the fork: check the"
-            " frame of the wrench and its transform to the hand in /tf_static"
+            f"the held force points {np.degrees(angle):.0f} degrees away from the fork: the sensor"
+            " is turned otherwise than /tf_static says, or was zeroed while the band was loaded:"
+            " check the wrench's frame there, zero the sensor before the grasp"
         )
     return 1.0 if cosine > 0 else -1.0
 

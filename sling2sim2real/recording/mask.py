@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from scipy.ndimage import binary_closing, binary_dilation, gaussian_filter
 
-from sling2sim2real.recording.scene import RgbdFrame, Scene, View, length
+from sling2sim2real.recording.scene import BLIND, RgbdFrame, Scene, View, length
 
 VOXEL, HALF = 0.008, 30  # m, and voxels from the middle to each side
 REACH = VOXEL * HALF
@@ -196,16 +196,21 @@ class RidgeMask:
         new = frame.near & (self.background - frame.depth > stands_out)
         if not new.any():
             return new
-        far = np.where(frame.depth > 0, frame.depth, FAR).astype(np.float32)
-        width = THICKNESS * self.focal * self.scene.diameter / far
-        sizes = 2 * np.round(width / 2).astype(np.int16) + 1
+        width = THICKNESS * self.focal * self.scene.diameter / frame.depth[new]
+        sizes = np.zeros(new.shape, np.int16)
+        sizes[new] = 2 * np.round(width / 2).astype(np.int16) + 1
+        most = int(sizes.max())  # a closing looks no further than its kernel is wide
+        left, top, wide, high = cv2.boundingRect(new.view(np.uint8))
+        rows = slice(max(0, top - most), top + high + most)
+        part = rows, slice(max(0, left - most), left + wide + most)
+        far = np.where(frame.depth[part] > BLIND, frame.depth[part], np.float32(FAR))
         thin = np.zeros_like(new)
         for size in np.unique(sizes[new]):
             # A closing of the depth fills whatever is nearer and narrower than its kernel.
             kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (int(size), int(size)))
             filled = cv2.morphologyEx(far, cv2.MORPH_CLOSE, kernel)
-            thin |= (sizes == size) & (filled - far > stands_out)
-        return new & thin
+            thin[part] |= (sizes[part] == size) & (filled - far > stands_out[part])
+        return thin
 
     def _off_lines(self, points: np.ndarray, time: float) -> np.ndarray:
         """Distance of points (S, 3) from where the taut band may be, shape (S,)."""
@@ -270,7 +275,7 @@ def _background(depths: np.ndarray) -> tuple[np.ndarray, float]:
     The noise is a standard deviation at 1 m; it grows with the square of the distance.
     """
     ranks = [int(share * (len(depths) - 1)) for share in (BACKGROUND, 0.5)]
-    depths[depths == 0] = np.inf
+    depths[depths < BLIND] = np.inf
     depths.partition(sorted({*ranks}), axis=0)
     seen, middle = depths[ranks[0]], depths[ranks[1]]
     still = np.isfinite(seen)

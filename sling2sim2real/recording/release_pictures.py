@@ -118,20 +118,33 @@ def release_pictures(pull: Pull, fork_width: float) -> ReleasePictures | None:
     )
 
 
+def points_near(
+    pull: Pull, rays: np.ndarray, depth: np.ndarray, places: np.ndarray, margin: float
+) -> np.ndarray:
+    """Points (P, 3) of what a depth picture (H, W) shows around some places (N, 3), frame O.
+
+    Args:
+        rays: Of the depth camera, shape (H, W, 3).
+        margin: Around the places [m]; none are seen where one is nearer to the camera than twice
+            of it.
+    """
+    camera, pose = pull.recording.depth_camera, pull.geometry.camera
+    seen = pose.inverse().apply(places)
+    nearest = float(seen[:, 2].min())
+    if nearest < 2 * margin:
+        return np.zeros((0, 3))
+    pixels, half = camera.project(seen), margin * np.diag(camera.matrix)[:2] / nearest
+    window = camera.window(pixels.min(axis=0) - half, pixels.max(axis=0) + half)
+    depth = depth[window]
+    return pose.apply((rays[window] * depth[..., None])[depth > 0]).astype(float)
+
+
 def _points(
     pull: Pull, rays: np.ndarray, depth: np.ndarray, tips: np.ndarray, hand: np.ndarray
 ) -> int:
     """How many points of a depth picture (H, W) lie where the drawn band's outer fifth is."""
-    camera, pose = pull.recording.depth_camera, pull.geometry.camera
     ends = [tip + share * (hand - tip) for tip in tips for share in (OUTER, 1.0)]
-    seen = pose.inverse().apply(np.array(ends))
-    if (seen[:, 2] < NEAR).any():
-        return 0
-    margin = NEAR * camera.matrix[0, 0] / seen[:, 2].min()
-    pixels = camera.project(seen)
-    window = camera.window(pixels.min(axis=0) - margin, pixels.max(axis=0) + margin)
-    depth = depth[window]
-    points = pose.apply((rays[window] * depth[..., None])[depth > 0].astype(float))
+    points = points_near(pull, rays, depth, np.array(ends), NEAR)
     chosen = np.zeros(len(points), bool)
     for tip in tips:
         length = np.linalg.norm(hand - tip)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import cast
 
 import cv2
@@ -205,7 +205,8 @@ class View:
         """The frame of two decoded pictures."""
         window = window or self.window
         depth = depth[window]
-        seen = self.rays[window] * np.where(depth > 0, depth, np.float32(UNKNOWN))[..., None]
+        known = np.where(depth > 0, depth, np.float32(UNKNOWN))
+        seen = cv2.multiply(self.rays[window], cv2.merge([known] * 3))
         camera = self.geometry.camera
         affine = np.column_stack([camera.rotation.as_matrix(), camera.translation])
         points = cv2.transform(seen, affine.astype(np.float32))
@@ -219,15 +220,16 @@ class View:
         """Pixels of points (H, W, 3) above the floor that the band's length allows."""
         scene, holds = self.scene, self.scene.holds(time)
         places = np.array([*scene.tips, scene.signals.hand(time)])[: 3 if holds else 2]
-        # |x - p|^2 = x.x - 2 p.x + p.p: one affine map of all pixels, which OpenCV does fastest.
+        # |x - p|^2 = x.x - 2 p.x + p.p: affine maps of all pixels, which OpenCV does fastest.
         affine = np.column_stack([-2 * places, np.einsum("ij,ij->i", places, places)])
-        away = cv2.transform(points, affine.astype(np.float32))
-        away += np.einsum("...i,...i->...", points, points)[..., None]
-        away = cv2.sqrt(np.maximum(away, 0, out=away))
-        left, right = away[..., 0], away[..., 1]
-        near = left + right < scene.reach(time)
+        square = cv2.transform(cv2.multiply(points, points), np.ones((1, 3), np.float32))
+        away = [
+            cv2.sqrt(np.maximum(cv2.transform(points, row[None]) + square, 0))
+            for row in affine.astype(np.float32)
+        ]
+        near = away[0] + away[1] < scene.reach(time)
         if holds:
-            near &= np.minimum(left, right) + away[..., 2] < scene.reach_of_half(time)
+            near &= np.minimum(away[0], away[1]) + away[2] < scene.reach_of_half(time)
         return near & (points[..., 2] > scene.floor + 2 * scene.diameter)
 
     def _pixels(self, color: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -275,30 +277,18 @@ class View:
 LOOKS, LEAST = 15, 3  # pictures that are looked at, and of which the hand must be known
 AROUND = 4  # pixels to each side of the hand
 FITS = 1.3  # by which factor the hand's depth may be off for what covers it
-ALIKE = 0.1  # of it, by which it differs from picture to picture
 OFF_CENTER = 0.2  # of a picture's size: a lens is before its middle
-UNITS = {  # by which what is read is too large, and the unit that was written
-    1000.0: "32FC1 in millimetres",
-    100.0: "32FC1 in centimetres",
-    10.0: "0.1 mm",
-    8.0: "0.125 mm",
-    5.0: "0.2 mm",
-    4.0: "0.25 mm",
-    2.0: "0.5 mm",
-    0.256: "1/256 m",
-    0.1: "cm",
-    0.001: "m",
-}
-CURE = "publish it as 16UC1 in millimetres or 32FC1 in metres, of the byte order that it says"
 
 
 def why_no_band(view: View) -> str:
     """What of the camera does not go with what is known of the hand, "" where all does."""
     camera = view.recording.depth_camera
-    looked = [view.depth(k) for k in np.linspace(0, len(view) - 1, LOOKS).astype(int)]
-    blank = sum(depth is not None and not depth.any() for depth in looked)
-    if len(looked) / 4 < blank < len(looked):
-        return f"{blank} of {LOOKS} depth pictures hold no depth at all: does the emitter blink?"
+    numbers = np.linspace(0, len(view) - 1, LOOKS).astype(int).tolist()
+    looked = {number: view.depth(number) for number in numbers}
+    blank = sum(depth is not None and not depth.any() for depth in looked.values())
+    if blank > len(looked) / 4:
+        count = len(looked)
+        return f"{blank} of {count} depth pictures hold no depth at all: does the emitter blink?"
     size = np.array([camera.width, camera.height])
     center = camera.matrix[[0, 1], 2]
     if np.any(np.abs(center / size - 0.5) > OFF_CENTER):
@@ -307,58 +297,28 @@ def why_no_band(view: View) -> str:
             f"the depth camera's principal point is at {at} of {whole} pixels: its camera_info is"
             " of another resolution"
         )
-    stated_factor, swapped = (_factor(view, other) for other in (False, True))
-    if stated_factor == 1.0 or (stated_factor is None and swapped is None):
+    factors = np.array([*_hand(view, looked)])
+    off = (factors < 1 / FITS) | (factors > FITS)
+    if len(factors) < LEAST or off.mean() < 0.5:
         return ""
-    reasons = []
-    if stated_factor is None or swapped == 1.0:
-        flag = int(view.recording.depth.values[0].is_bigendian)
-        reasons.append(f"is_bigendian is {flag}, but the depth's bytes are the other way round")
-        stated_factor = swapped
-    if stated_factor is not None and stated_factor != 1.0:
-        unit = f", as of unit {UNITS[stated_factor]}" if stated_factor in UNITS else ""
-        reasons.append(f"the depth is {stated_factor:g} times what it must be at the hand{unit}")
-    return f"{', and '.join(reasons)}: {CURE}"
+    factor = float(f"{np.median(factors):.2g}")
+    return (
+        f"the depth is about {factor:g} times what it must be at the hand: publish it as 16UC1 in"
+        " millimetres or 32FC1 in metres, of the byte order that it says, or check the camera's"
+        " pose"
+    )
 
 
-def _factor(view: View, swapped: bool) -> float | None:
-    """Factor by which the hand's depth is too large: 1, one of UNITS, or another.
-
-    None where it differs from picture to picture, or too few show it.
-
-    Args:
-        swapped: With the pixels' bytes the other way round than they say.
-    """
-    seen = np.array([*_hand(view, swapped)])
-    if len(seen) < LEAST:
-        return None
-    factor = float(np.median(seen))
-    if np.median(np.abs(seen / factor - 1)) > ALIKE:
-        return None
-    near = min((1.0, *UNITS), key=lambda unit: abs(np.log(factor / unit)))
-    return near if 1 / FITS < factor / near < FITS else float(f"{factor:.2g}")
-
-
-def _hand(view: View, swapped: bool) -> Iterator[float]:
+def _hand(view: View, looked: dict[int, np.ndarray | None]) -> Iterator[float]:
     """Depth where the hand must be, over what it must be, of pictures in which both are known."""
     camera, place = view.recording.depth_camera, view.geometry.camera.inverse()
-    for number in np.linspace(0, len(view) - 1, LOOKS).astype(int):
+    for number, depth in looked.items():
         hand = place.apply(view.scene.signals.hand(view.times[number])[None])
-        if hand[0, 2] <= 0:
+        if depth is None or hand[0, 2] <= 0:
             continue
         u, v = np.round(camera.project(hand)[0]).astype(int)
         if not (AROUND <= u < camera.width - AROUND and AROUND <= v < camera.height - AROUND):
             continue
-        picture = view.recording.depth.values[view.index[number][0]]
-        if swapped and not picture.encoding:
-            return  # packed pictures have their own order
-        try:
-            depth = images.depth(replace(picture, is_bigendian=picture.is_bigendian ^ swapped))
-        except images.Undecodable:
-            continue
-        if depth.shape != (camera.height, camera.width):
-            continue
         near = depth[v - AROUND : v + AROUND + 1, u - AROUND : u + AROUND + 1]
-        near = near[near > 0]
-        if len(near):
-            yield float(np.median(near)) / hand[0, 2]
+        if near.any():
+            yield float(np.median(near[near > 0])) / hand[0, 2]

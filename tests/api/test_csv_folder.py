@@ -88,6 +88,11 @@ def changed(folder, tmp_path, name: str, content: bytes | None):
         ),
         (
             "force.csv",
+            b"time,fx,fy,fz\n1,0,n/a,0\n\n",
+            "force.csv, line 2: fy is no number: 'n/a'",
+        ),
+        (
+            "force.csv",
             b"time,fx,fy,fz\n1,0,0,0\n1,0,0,0\n",
             "force.csv, line 3: time does not incr",
         ),

@@ -5,7 +5,6 @@ files. What is slow, and has tests of its own, answers with what it was given.
 """
 
 import argparse
-import json
 import shutil
 import sys
 from collections.abc import Callable
@@ -17,6 +16,7 @@ import pytest
 from sling2sim2real.cli import checkout, cli
 from sling2sim2real.cli.command_line import COMMANDS
 from sling2sim2real.cli.preflight.check import Look
+from sling2sim2real.cli.preflight.report import new_report
 from tests.cli.test_fit import CARD
 from tests.project import contents
 
@@ -50,12 +50,12 @@ CASES = {
 ADDED = {
     FIT: "--mass 0.05, --diameter 0.011, --rest-length 0.5, --policy, --json",
     "check seen.mcap": "--mass 0.05, --diameter 0.02, --rest-length 0.5, --pull 2,"
-    " --sheet sheet.txt, --pictures bands, --frames, --json",
+    " --sheet sheet.txt, --pictures bands, --json",
     SETUP: "--left-tip=0.7,0.1375,0.42, --right-tip=0.7,-0.1375,0.42, --fork-width 0.3,"
     f" --base-to-camera={POSE}, --camera-to-fork=0,0,0.9,1,0,0,0, --floor=-0.1, --draw-y=-0.4,-0.3,"
     " --draw-z=-0.2,-0.1, --tool=0.7,0,0,0.05, --topic wrench=/ft, --json",
     PLAN: "--mass 0.05, --diameter 0.02, --rest-length 0.5, --draw=-0.30,-0.1,"
-    " --recording none.mcap, --pull paper, --pulls 2, --out there, --rate 50,"
+    " --pull paper, --pulls 2, --out there, --rate 50,"
     " --json",
     LAUNCH: "--theta none.json, --json",
     "aim bands/toy --target 19": "--force, --json",
@@ -132,11 +132,7 @@ def echo(patch: pytest.MonkeyPatch) -> None:
         return CARD | {"values": [values[0] | {"fixed": True}], "card": "README.md"}
 
     def look_at(*given) -> Look:
-        message = SimpleNamespace(
-            written=[], usable=True, to_text=lambda: repr(given[:1] + given[2:])
-        )
-        message.to_json = lambda frames: json.dumps([repr(given[2:]), frames])
-        return Look(message)
+        return Look(new_report(given[0], given[2].facts) | {"notes": [repr(given[2:])]})
 
     def export(found, to, out, samples) -> SimpleNamespace:
         return SimpleNamespace(folder=out, card={"files": [str(to), str(out), f"{samples}"]})

@@ -15,9 +15,8 @@ from sling2sim2real.recording.mask import Colors, RidgeMask, Shape
 from sling2sim2real.recording.scene import View
 from sling2sim2real.recording.transforms import Transform
 from tests.project import DEFAULTS
-from validation.recordings import looks, strand
-from validation.recordings.looks import LOOKS
-from validation.recordings.scores import PHASES, figures
+from validation.recordings import looks
+from validation.recordings.looks import LOOKS, PHASES, TRUTH, figures
 
 FRAMES = 24
 # Depth alone decides in looks that differ in colour alone: these differ in what matters.
@@ -108,7 +107,7 @@ def test_without_a_taut_frame_no_colour_counts(cloud) -> None:
     """Where the band is longer than the hand goes, nothing is surely the band."""
     view, _ = looks.view_of(LOOKS["orange on grey, white arm"], looks.times(8))
     long = replace(view.scene, rest_length=2.0)
-    slack = View(view.recording, view.geometry, long, strand.END)
+    slack = View(view.recording, view.geometry, long, TRUTH.end)
     assert not clouds_of(slack, cloud).color_counts
 
 
@@ -118,14 +117,14 @@ def test_a_camera_that_looks_elsewhere_is_told_so() -> None:
         aside = Transform(Rotation.from_rotvec(turn), np.zeros(3))
         geometry = replace(view.geometry, camera=view.geometry.camera @ aside)
         with pytest.raises(UserError, match="looks past where the band can be"):
-            View(view.recording, geometry, view.scene, strand.END)
+            View(view.recording, geometry, view.scene, TRUTH.end)
 
 
 def test_what_is_said_to_touch_the_lens_is_nowhere(cloud) -> None:
     """A camera so near that the band could reach it, with pixels of a few millimetres."""
     view, _ = looks.view_of(LOOKS["orange on grey, white arm"], looks.times(8))
     there = Transform(view.geometry.camera.rotation, np.array([0.0, 0.05, 0.0]))
-    close = View(view.recording, replace(view.geometry, camera=there), view.scene, strand.END)
+    close = View(view.recording, replace(view.geometry, camera=there), view.scene, TRUTH.end)
     depth = np.full((480, 640), 0.2, np.float32)
     depth[::40, ::40] = 0.003
     frame = close.rgbd_frame(0, depth, view.color(0))

@@ -69,19 +69,9 @@ def written(pixels: np.ndarray, factor: float, kind: type, swapped: bool = False
 @pytest.mark.parametrize(
     "factor, kind, swapped, output",
     [
-        (
-            10,
-            np.uint16,
-            False,
-            "the depth is 10 times what it must be at the hand, as of unit 0.1 mm",
-        ),
-        (4, np.uint16, False, "the depth is 4 times"),
-        (0.1, np.uint16, False, "the depth is 0.1 times"),
-        (3, np.uint16, False, "the depth is 3(.0.)? times what it must be at the hand: publish"),
-        (1, np.float32, False, "the depth is 1000 times"),
-        (1, np.uint16, True, "is_bigendian is 1, but the depth's bytes are the other way round"),
-        (0.001, np.float32, True, "is_bigendian is 1, but"),
-        (4, np.uint16, True, "the other way round, and the depth is 4 times"),
+        *((factor, np.uint16, False, f"about {factor:g} times") for factor in (10, 4, 3, 0.1)),
+        (1, np.float32, False, "about 1000 times"),
+        *((f, kind, True, "of the byte order") for f, kind in ((1, np.uint16), (1e-3, np.float32))),
         (1, np.uint16, False, None),
         (0.001, np.float32, False, None),
     ],

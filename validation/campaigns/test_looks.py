@@ -5,7 +5,6 @@ import pytest
 from pipeline.params import Params
 from sling2sim2real.recording.clouds import clouds_of
 from validation.recordings import looks
-from validation.recordings.scores import figures
 
 pytestmark = pytest.mark.validation
 
@@ -17,7 +16,7 @@ def test_the_band_is_found_in_every_look(params: Params, progress, record) -> No
     summaries = {}
     for name, look in looks.LOOKS.items():
         view, truths = looks.view_of(look, looks.times(FRAMES))
-        summaries[name] = figures(view, truths, clouds_of(view, params.cloud))
+        summaries[name] = looks.figures(view, truths, clouds_of(view, params.cloud))
         summary = summaries[name]["all"]
         progress(
             f"  {name}: {1e3 * summary['median_off_m']:.1f} mm,"

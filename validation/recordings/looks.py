@@ -1,7 +1,8 @@
 """Pictures with known truth of a band before a fork, an arm, a floor and a wall, in many looks.
 
 Triangles and rays (Open3D), a light that casts shadows, the noise, flying pixels and drop-outs of a
-time-of-flight camera, JPEG. Nothing of rig: what is tested here did not learn from it.
+time-of-flight camera, JPEG. The band moves by the formulas of `bag`. Nothing of rig: what is tested
+here did not learn from it.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ from sling2sim2real.recording.messages import Picture
 from sling2sim2real.recording.scene import Scene, View
 from sling2sim2real.recording.streams import Recording, Stream
 from sling2sim2real.recording.transforms import Transform
-from validation.recordings import strand
-from validation.recordings.bag import FLOOR
-from validation.recordings.strand import GRASP, RELEASE, REST, TIPS
+from validation.recordings.bag import FLOOR, REST, TIPS, Truth
+
+TRUTH = Truth(release=2.9)
 
 SIZE, FOCAL = (640, 480), 495.0
 RANGE, BLUR = 2.2, 0.0006  # m beyond which there is no depth; noise at 1 m [m]
@@ -150,24 +151,25 @@ def _still() -> list[tuple[int, o3d.geometry.TriangleMesh]]:
 
 
 def _arm(time: float) -> list[tuple[int, o3d.geometry.TriangleMesh]]:
-    tip = strand.path()(time)
+    tip, fingers = TRUTH.hand(time), opening(time) / 2 + 0.006
     parts = [(ARM, _box((0.07, 0.2, 0.07), tip - 0.10 * APPROACH, AXES))]
     for sign in (-1, 1):
-        aside = sign * (strand.opening(time) / 2 + 0.006) * AXES[:, 1]
+        aside = sign * fingers * AXES[:, 1]
         parts.append((FINGER, _box((0.02, 0.012, 0.07), tip - 0.025 * APPROACH + aside, AXES)))
     wrist, shoulder = tip - 0.26 * APPROACH, np.array([0.0, -0.95, -0.1])
-    reach = wrist - shoulder
-    distance = np.linalg.norm(reach)
-    rise = np.sqrt(max(0.40**2 - (distance / 2) ** 2, 0.01))
-    elbow = shoulder + reach / 2 + rise * np.cross([1.0, 0, 0], reach / distance)
     for start, end, radius in (
         (tip - 0.13 * APPROACH, wrist, 0.045),
-        (wrist, elbow, 0.055),
-        (elbow, shoulder, 0.06),
+        (wrist, shoulder, 0.055),
         (shoulder, np.array([0.0, -0.95, FLOOR]), 0.08),
     ):
         parts += [(ARM, mesh) for mesh in _rod(start, end, radius)]
     return parts
+
+
+def opening(time: float) -> float:
+    """Between the fingers [m]."""
+    moves = [TRUTH.grasp - 0.1, TRUTH.grasp, TRUTH.release, TRUTH.release + 0.05]
+    return float(np.interp(time, moves, [0.07, 0.01, 0.01, 0.07]))
 
 
 def _tube(line: np.ndarray, radius: np.ndarray) -> o3d.geometry.TriangleMesh:
@@ -193,7 +195,8 @@ def _tube(line: np.ndarray, radius: np.ndarray) -> o3d.geometry.TriangleMesh:
 
 def band(time: float, diameter: float) -> tuple[np.ndarray, np.ndarray]:
     """Centre line (N, 3) and radius (N,), thinner where it is stretched."""
-    line = strand.strand().center_line(time)
+    first, second = np.split(TRUTH.center_line(time), 2)
+    line = np.concatenate([first, second[-2::-1]])
     stretch = np.linalg.norm(np.diff(line, axis=0), axis=1) * (len(line) - 1) / REST
     middles = np.arange(len(line) - 1) + 0.5
     stretch = np.clip(np.interp(np.arange(len(line)), middles, stretch), 0.8, 4)
@@ -261,22 +264,22 @@ class LookSignals:
 
     time: np.ndarray
     origin: int = 0
-    grasp_time: float = GRASP
-    release_time: float = RELEASE
+    grasp_time: float = TRUTH.grasp
+    release_time: float = TRUTH.release
     tool_axis: np.ndarray = field(default_factory=lambda: APPROACH)
     facts: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(turn=0.0))
 
-    def hand(self, times: np.ndarray) -> np.ndarray:
-        return strand.path()(times)
+    def hand(self, time: float) -> np.ndarray:
+        return TRUTH.hand(time)
 
     def opening_at(self, time: float) -> float:
-        return strand.opening(time)
+        return opening(time)
 
 
 def times(count: int) -> np.ndarray:
     """Stamps of so many frames with a pace that is finer after the release."""
-    before = np.linspace(0.05, RELEASE - 0.03, count - 2 * count // 5)
-    after = RELEASE + 0.004 + 1.25 * np.linspace(0, 1, 2 * count // 5) ** 1.5
+    before = np.linspace(0.05, TRUTH.release - 0.03, count - 2 * count // 5)
+    after = TRUTH.release + 0.004 + 1.25 * np.linspace(0, 1, 2 * count // 5) ** 1.5
     return np.concatenate([before, after])
 
 
@@ -316,6 +319,66 @@ def assemble(look: Appearance, stamps: np.ndarray, colors: list, depths: list) -
     geometry = Geometry(
         Transform.identity(), Transform(turn, place), to_color, Rotation.identity(), True, {}
     )
-    signals = LookSignals(np.linspace(0, strand.END, 140))
+    signals = LookSignals(np.linspace(0, TRUTH.end, 140))
     scene = Scene(TIPS, FLOOR, look.diameter, REST, signals)
-    return View(recording, geometry, scene, strand.END)
+    return View(recording, geometry, scene, TRUTH.end)
+
+
+PHASES = ("hanging", "lift", "taut", "recoil", "swing")
+
+
+def phase(time: float) -> str:
+    if time < TRUTH.grasp:
+        return "hanging"
+    if time < TRUTH.release:
+        far = np.linalg.norm(TIPS - TRUTH.hand(time), axis=1).sum()
+        return "taut" if far > 1.05 * REST else "lift"
+    return "recoil" if time < TRUTH.release + 0.1 else "swing"
+
+
+def score(
+    view: View, frame: object, truth: FrameTruth, points: np.ndarray
+) -> dict[str, np.ndarray]:
+    """How a cloud compares with the truth.
+
+    Returns:
+        off: Distances of the points from the band's surface [m]; covered: for each 5 mm of the
+        band that has pixels with depth, whether points lie within 5 mm of its surface.
+    """
+    nodes = np.arange(len(truth.line))
+    arc = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(truth.line, axis=0), axis=1))])
+    fine = np.interp(np.arange(0, arc[-1], 0.0025), arc, nodes)
+    line = np.stack([np.interp(fine, nodes, axis) for axis in truth.line.T], axis=1)
+    radius = np.interp(fine, nodes, truth.radius)
+    part, depth = truth.part[view.window], truth.depth[view.window]
+    bears = (part == BAND) & (np.abs(frame.depth - depth) < 0.005)
+    away = np.linalg.norm(frame.points[bears][:, None] - line[None], axis=-1)
+    seen = np.unique(away.argmin(axis=1) // 2) if len(away) else np.zeros(0, int)
+    gaps = np.linalg.norm(points[:, None].astype(float) - line[None], axis=-1) - radius
+    if not len(points):
+        return {"off": np.zeros(0), "covered": np.zeros(len(seen), bool)}
+    reached = gaps.min(axis=0) < 0.005
+    bins = np.add.reduceat(reached, np.arange(0, len(line), 2)) > 0
+    return {"off": np.abs(gaps.min(axis=1)), "covered": bins[seen]}
+
+
+def figures(view: View, truths: list[FrameTruth], clouds: object) -> dict[str, dict[str, float]]:
+    """Score all frames and each phase: median distance from the surface, covered share, strays."""
+    phase_scores: dict[str, list] = {"all": []}
+    numbered = zip(view.frames(), clouds.points, strict=True)
+    for (number, frame), points in numbered:
+        frame_score = score(view, frame, truths[number], points)
+        phase_scores["all"].append(frame_score)
+        phase_scores.setdefault(phase(frame.time), []).append(frame_score)
+    summary = {}
+    for name, scores in phase_scores.items():
+        off = np.concatenate([frame_score["off"] for frame_score in scores])
+        summary[name] = {
+            "frames": len(scores),
+            "median_off_m": float(np.median(off)),
+            "covered": float(
+                np.mean(np.concatenate([frame_score["covered"] for frame_score in scores]))
+            ),
+            "further_than_1cm": float(np.mean(off > 0.01)),
+        }
+    return summary

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -12,65 +11,10 @@ from scipy.optimize import brentq
 
 from sling2sim2real.api.identification import Identification
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.transforms import Transform
-from sling2sim2real.settings import Settings
 from sling2sim2real.settings.lab import SetupParams
 from sling2sim2real.simulator.model import BandSizes
 
-ALIKE = 0.02  # relative: stretches that are as good as equal
 GENTLE = 1.25  # stretch of a first pull, where nothing is known of the force
-
-
-@dataclass(frozen=True)
-class Earlier:
-    """What an earlier recording of this rig and band tells.
-
-    Attributes:
-        path: The file.
-        base: Robot's base to frame O.
-        base_source: Where that came from, in words.
-        frame: Name of the base.
-        force: Held at its release [N], None where it has no pull that can be used.
-        drawn: Where the hand was then, frame O [m], shape (3,).
-        problem: Why there is no force, in one line.
-    """
-
-    path: Path
-    base: Transform
-    base_source: str
-    frame: str
-    force: float | None
-    drawn: np.ndarray | None
-    problem: str | None
-
-
-def read_earlier(path: Path, params: Settings) -> Earlier:
-    """Read a recording as far as a plan needs it: no pictures. Raises UserError.
-
-    Of several pulls, the first that can be used.
-    """
-    from sling2sim2real.recording.events import Pull, parts_of
-    from sling2sim2real.recording.frames import geometry_of
-    from sling2sim2real.recording.signals import signals_of
-    from sling2sim2real.recording.streams import read_recording
-
-    recording = read_recording(Path(path), params.setup, params.episode.delays)
-    geometry = geometry_of(recording, params.setup)
-    base, source = geometry.base, geometry.sources["base_to_fork"]
-    frame, problem = recording.pose.frame, None
-    try:
-        for part in parts_of(recording, geometry):
-            try:
-                signals = signals_of(Pull.of(part), params)
-            except UserError as error:
-                problem = problem or f"{path}: {str(error).removeprefix(f'{path}: ')}"
-                continue
-            force = float(np.linalg.norm(signals.facts.hold_force))
-            drawn = signals.hand(signals.release_time)
-            return Earlier(path, base, source, frame, force, drawn, None)
-    except UserError as error:
-        problem = f"{path}: {error}"
-    return Earlier(path, base, source, frame, None, None, problem)
 
 
 @dataclass(frozen=True)
@@ -119,39 +63,19 @@ class Prediction:
     source: str
 
 
-def predict(
-    held: Held, drawn: np.ndarray, found: Identification | None, earlier: Earlier | None
-) -> Prediction:
-    """The force at `drawn` (3,): by the simulator, else by an earlier recording, else unknown."""
-    stretch = held.stretch(drawn)
+def predict(held: Held, drawn: np.ndarray, found: Identification | None) -> Prediction:
+    """The force at `drawn` (3,): by the simulator of an identified band, else unknown."""
     if found is not None:
         return Prediction(_simulated(found, drawn), "simulated with its θ")
-    if earlier and earlier.force is not None and earlier.drawn is not None:
-        was = held.stretch(earlier.drawn)
-        if was <= 1:
-            raise UserError(
-                f"{earlier.path}: holds {earlier.force:.1f} N where the band should be slack, at"
-                f" {was:.2f} of its rest length {held.rest_length:g} m: correct that length,"
-                " or give a recording of this band"
-            )
-        force = earlier.force * held.force(drawn) / held.force(earlier.drawn)
-        source = f"{earlier.path} held {earlier.force:.2f} N at stretch {was:.2f}"
-        if abs(stretch / was - 1) > ALIKE:
-            source += ", scaled to this stretch: good to 15 % or so"
-        if stretch > (1 + ALIKE) * was:
-            source += ", and beyond that stretch a band may stiffen"
-        return Prediction(force, source)
-    why = "the band is not identified, and no recording was given"
-    if earlier is not None:
-        why = earlier.problem
-    advice = ""
+    stretch, advice = held.stretch(drawn), ""
     if stretch > GENTLE:
         _, y, z = held.reach(held.stretch, GENTLE, drawn) * drawn
         advice = (
-            f": begin with a shallow pull, --draw={y:.2f},{z:.2f}, and give its recording to the"
-            " next plan with --recording"
+            f": begin with a shallow pull, --draw={y:.2f},{z:.2f}, and `sling fit` its recording,"
+            " which tells the next plan"
         )
-    return Prediction(None, f"not checked: {why}; the band is stretched to {stretch:.2f}{advice}")
+    source = f"not checked: the band is not identified; it is stretched to {stretch:.2f}{advice}"
+    return Prediction(None, source)
 
 
 def _simulated(found: Identification, drawn: np.ndarray) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +20,7 @@ from sling2sim2real.base.files import write_json, write_text
 from sling2sim2real.cli.arguments import PULLS
 from sling2sim2real.cli.command_line import say
 from sling2sim2real.cli.plan import limits, messages
-from sling2sim2real.cli.plan.force import Earlier, Held, Prediction, predict, read_earlier
+from sling2sim2real.cli.plan.force import Held, Prediction, predict
 from sling2sim2real.cli.plan.hand import along_pull, quaternion
 from sling2sim2real.cli.plan.pull import hanging_middle, trajectory_of
 from sling2sim2real.cli.plan.trajectory import Trajectory
@@ -35,7 +34,7 @@ INFORMATIVE, PAPER = PULLS
 MOST_PULLS = 10  # a file of them is half a gigabyte
 NO_BASE = (
     "nothing says where it stands in the robot's base, so all is in frame O, which no robot knows:"
-    " `sling setup` asks for it, or give a --recording whose /tf_static has it"
+    " `sling setup` asks for it, and a band knows it that was identified with it"
 )
 
 
@@ -174,11 +173,10 @@ class Plan:
 
 
 class KnownBand(NamedTuple):
-    """What a plan is made for; `found` and `recordings` of a band that is there."""
+    """What a plan is made for; `found` of a band that was identified."""
 
     settings: Settings
     band: Band
-    recordings: list[Path]
     found: Identification | None
 
 
@@ -196,19 +194,18 @@ def known_band(place: Path | None, sizes: dict[str, float]) -> KnownBand:
             say(f"assumed: {' and '.join(taken)}")
         settings = lab_settings()
         expect_long(whole["rest_length"], settings.setup)
-        return KnownBand(settings, Band(**whole, name="new"), [], None)
+        return KnownBand(settings, Band(**whole, name="new"), None)
     folder = BandFolder.at(place)
     if sizes:
         raise UserError(f"{folder.band_file} has the band's sizes: leave these out")
     found = Identification.load(folder.path) if folder.theta.is_file() else None
-    return KnownBand(folder.settings, folder.band, folder.recordings, found)
+    return KnownBand(folder.settings, folder.band, found)
 
 
 def plan_recording(
     params: Settings,
     band: Band,
     *,
-    recordings: Sequence[Path] = (),
     found: Identification | None = None,
     draw: tuple[float, float] | None = None,
     pull: str = INFORMATIVE,
@@ -216,14 +213,13 @@ def plan_recording(
 ) -> Plan:
     """Plan the recording of a band and check it against every limit.
 
-    Where the fork stands in the robot's base is taken from setup.base_to_fork, else from the first
-    of `recordings` that can be read, else from what was identified; else all is in frame O.
+    Where the fork stands in the robot's base is taken from setup.base_to_fork, else from what was
+    identified; else all is in frame O.
 
     Args:
         params: Settings of the lab.
         band: Whose recording it is to be.
-        recordings: Earlier ones of this rig and of this band, which also tell the force.
-        found: The band, where it has been identified: it tells the force too.
+        found: The band, where it has been identified: it tells the force.
         draw: Drawn position (y, z), frame O [m]; plan.draw if None.
         pull: INFORMATIVE with plan.dips, PAPER without.
         pulls: How many in one recording; between two the hand returns and grasps again.
@@ -235,8 +231,7 @@ def plan_recording(
         raise UserError(f"--pulls: at most {MOST_PULLS} in one recording, got {pulls}")
     setup = params.setup
     settings = params.plan if draw is None else params.plan.model_copy(update={"draw": draw})
-    earlier = _earlier(params, recordings)
-    base, source, frame = _standing(params, earlier, found)
+    base, source, frame = _standing(params, found)
     if source is None and settings.orientation is not None:
         raise UserError(f"plan.orientation is the hand's in the robot's base: {NO_BASE}")
     drawn = np.array([0.0, *settings.draw])
@@ -246,7 +241,7 @@ def plan_recording(
     hand = Rotation.from_quat(given) if given else base.rotation * along_pull(drawn)
     axis = (base.rotation.inv() * hand).apply([0.0, 0.0, 1.0])
     limits.check_hand(settings, band, axis, drawn)
-    prediction = predict(held, drawn, found, earlier)
+    prediction = predict(held, drawn, found)
 
     dips = settings.dips if pull == INFORMATIVE else ()
     plan = settings.model_copy(update={"dips": dips})
@@ -278,28 +273,8 @@ def plan_recording(
     )
 
 
-def _earlier(params: Settings, recordings: Sequence[Path]) -> Earlier | None:
-    """What the first recording tells that can be read. Raises UserError where none can."""
-    problem = None
-    for path in recordings:
-        try:
-            return read_earlier(path, params)
-        except UserError as error:
-            problem = problem or error
-    if problem:
-        raise problem
-    return None
-
-
-def _standing(
-    params: Settings, earlier: Earlier | None, found: Identification | None
-) -> tuple[Transform, str | None, str]:
+def _standing(params: Settings, found: Identification | None) -> tuple[Transform, str | None, str]:
     """Frame O to the robot's base, where that came from (None: from nowhere), the base's name."""
-    if earlier is not None:
-        source = earlier.base_source
-        if not source.startswith("setup"):
-            source = f"{source} of {earlier.path}"
-        return earlier.base.inverse(), source, earlier.frame or params.plan.frame
     if params.setup.base_to_fork is not None:
         fork = Transform.of(params.setup.base_to_fork)
         return fork, "setup.base_to_fork", params.plan.frame

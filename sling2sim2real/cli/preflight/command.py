@@ -11,6 +11,7 @@ from sling2sim2real.cli.command_line import say
 from sling2sim2real.cli.preflight.check import GivenBand, look_at
 from sling2sim2real.cli.preflight.output import expect_writable, written
 from sling2sim2real.cli.preflight.pictures import expect_new, write_pictures
+from sling2sim2real.cli.preflight.report import to_json, to_text
 from sling2sim2real.settings import Settings
 
 DRAWN = "sheet", "pictures"
@@ -61,7 +62,6 @@ def checked(
     band: GivenBand,
     *,
     as_json: bool = False,
-    frames: bool = False,
     sheet: Path | None = None,
     pictures: Path | None = None,
     pull: int | None = None,
@@ -72,7 +72,6 @@ def checked(
         params: Settings of the lab.
         band: With what is known of it.
         as_json: The report as JSON, with what was drawn under `written`.
-        frames: There, a row a picture under `coverage`.
         sheet: File to write.
         pictures: Folder to write, of what `cloud.mask: folder` wants masks of.
         pull: Which of several; None for the first that can be used, if there is one.
@@ -92,10 +91,10 @@ def checked(
         from sling2sim2real.cli.preflight.sheet import draw_sheet
 
         with written(sheet):
-            look.report.written.append(draw_sheet(look, params, sheet))
+            look.report["written"].append(draw_sheet(look, params, sheet))
     if pictures:
         with written(pictures):
             message = write_pictures(look.pulls, pictures)
-        look.report.written.append(message)
-    report = look.report
-    return report.to_json(frames) if as_json else report.to_text(), int(not report.usable)
+        look.report["written"].append(message)
+    text = to_json(look.report) if as_json else to_text(look.report)
+    return text, int(look.report["problem"] is not None)

@@ -1,23 +1,86 @@
-"""What `sling check` tells of a pull in numbers: each function makes an object of its JSON.
+"""What `sling check` tells of a recording in numbers: each function makes a part of its JSON.
 
 Names end with their unit; times are seconds since the file's first force, vectors are of frame O.
 """
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from sling2sim2real.episode.phases import InteractionPhase
-from sling2sim2real.recording.build import Whole
+from sling2sim2real.episode.phases import InteractionPhase, phases_of_hand, unseen
+from sling2sim2real.recording.build import Processed, Whole
+from sling2sim2real.recording.calibration import Calibration
 from sling2sim2real.recording.checks import camera_to_fork
+from sling2sim2real.recording.clouds import by_phase
 from sling2sim2real.recording.delays import Delays
+from sling2sim2real.recording.files import Container
+from sling2sim2real.recording.frames import Geometry
 from sling2sim2real.recording.scene import Scene
 from sling2sim2real.recording.signals import Signals
 from sling2sim2real.recording.streams import Recording
 
 Facts = dict[str, Any]
+
+
+def of_topics(container: Container, recording: Recording | None = None) -> list[Facts]:
+    """A row a topic, with what is known of those that play a role.
+
+    Of these: `role` (several with commas between them), `why` it was chosen, `rate` [Hz],
+    `longest_gap` [s], `missing` messages by that rate, `lost` ones, `delay` of receipt [s],
+    `clock_offset` by which the stamps are ahead of the force's [s], and `notes` of what was mended.
+    """
+    rows: dict[str, Facts] = {
+        topic.name: {
+            "topic": topic.name,
+            "type": topic.schema.name,
+            "messages": len(topic.log_times),
+            "role": None,
+        }
+        for topic in container.topics
+    }
+    for role, stream in recording.streams.items() if recording else ():
+        assert recording
+        row = rows[stream.topic]
+        row |= {
+            "role": f"{row['role']}, {role}" if row["role"] else role,
+            "why": recording.choices[role],
+            "rate": 1 / stream.period,
+            "longest_gap": stream.longest_gap,
+            "missing": stream.missing,
+            "lost": stream.lost,
+            "delay": stream.receipt_delay,
+            "clock_offset": recording.wrench.receipt_delay - stream.receipt_delay,
+            "notes": list(stream.notes),
+        }
+    return [rows[name] for name in sorted(rows)]
+
+
+def of_pull(done: Processed) -> Facts:
+    """What a report says of one pull, as far as it can be used."""
+    part, signals, whole, refusal = done.part, done.signals, done.whole, done.refusal
+    problem = str(refusal).removeprefix(f"{part.recording.path}: ") if refusal else None
+    told: Facts = {
+        "pull": part.number,
+        "frames": part.geometry.sources,
+        "cautions": [caution.content() for caution in done.cautions],
+        "problem": problem,
+    }
+    if done.delays:
+        told["delays"] = of_delays(done.delays)
+    if signals and done.scene:
+        told["signals"] = of_signals(part.recording, signals, done.scene)
+        phases, start = phases_of_hand(signals), told["signals"]["window_start_s"]
+        told["motion"] = [of_phase(phase, start) for phase in phases]
+        told["keeps_prior"] = unseen(phases)
+    if whole:
+        told["cloud"] = of_clouds(whole)
+        told["phases"] = [asdict(phase) for phase in by_phase(whole.coverage)]
+        if whole.calibration:
+            told["extrinsics"] = of_extrinsics(whole.calibration, part.geometry)
+    return told
 
 
 def of_signals(recording: Recording, signals: Signals, scene: Scene) -> Facts:
@@ -86,25 +149,16 @@ def of_clouds(whole: Whole) -> Facts:
     }
 
 
-def of_extrinsics(whole: Whole) -> Facts:
-    """How far fork tips and hand are off in the clouds, with standard errors; {} if not known.
+def of_extrinsics(seen: Calibration, geometry: Geometry) -> Facts:
+    """How far fork tips and hand are off in the clouds, with standard errors.
 
     `camera_to_fork` is what would put the camera's clouds in their place, as setup has it.
     """
-    seen = whole.calibration
-    if not seen:
-        return {}
-    (off, error), (hand_off, hand_error) = seen.camera_off, seen.hand_off
-    return {
-        "pictures": seen.frames,
-        "off_m": off,
-        "off_error_m": error,
-        "tips_m": seen.camera.tolist(),
-        "tips_error_m": seen.camera_error.tolist(),
-        "hand_off_m": hand_off,
-        "hand_off_error_m": hand_error,
-        "hand_m": seen.hand.tolist(),
-        "hand_error_m": seen.hand_error.tolist(),
-        "residual_m": seen.residual,
-        "camera_to_fork": camera_to_fork(seen, whole.pull.geometry),
-    }
+    facts: Facts = {"pictures": seen.frames, "residual_m": seen.residual}
+    for name, off, distance in (
+        ("tips", (seen.camera, seen.camera_error), seen.camera_off),
+        ("hand", (seen.hand, seen.hand_error), seen.hand_off),
+    ):
+        facts |= {f"{name}_m": off[0].tolist(), f"{name}_error_m": off[1].tolist()}
+        facts |= {f"{name}_off_m": distance[0], f"{name}_off_error_m": distance[1]}
+    return facts | {"camera_to_fork": camera_to_fork(seen, geometry)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ import numpy as np
 from sling2sim2real.base.files import replacing
 from sling2sim2real.cli.preflight.check import Look
 from sling2sim2real.cli.preflight.facts import Facts
+from sling2sim2real.cli.preflight.report import verdict_of
 from sling2sim2real.drawing.names import as_label
 from sling2sim2real.drawing.styles import COLORS, INK, THEME
 from sling2sim2real.recording import images
@@ -34,17 +34,6 @@ DIM = 0.55  # of what is no band
 ROOM = 0.06  # m around the scene
 
 
-@dataclass(frozen=True)
-class Moment:
-    """One moment: seconds since the window's start, the picture, its mask and its cloud."""
-
-    name: str
-    time: float
-    color: np.ndarray
-    mask: np.ndarray
-    points: np.ndarray
-
-
 def draw_sheet(look: Look, params: Settings, path: Path) -> str:
     """Write a PNG, 1600 pixels wide, of what can be shown.
 
@@ -58,12 +47,12 @@ def draw_sheet(look: Look, params: Settings, path: Path) -> str:
         return f"{path} was not drawn: nothing in the recording can be shown"
     with context(THEME):
         figure = plt.figure(figsize=SIZE if look.done else (16, 6.5), dpi=DPI)
-        if look.done and look.report.signals:
-            _whole(figure, look.done, look.report.signals, look.report.coverage, params)
+        if look.done:
+            _whole(figure, look.done, look.report["signals"], params)
         else:
             _raw(figure, look.recording)
-        verdict = look.report.verdict.removesuffix(", but:")
-        title = as_label(f"{Path(look.report.path).name}: {verdict}")
+        verdict = verdict_of(look.report).removesuffix(", but:")
+        title = as_label(f"{Path(look.report['path']).name}: {verdict}")
         figure.suptitle(title, fontsize=12, wrap=True)
         with replacing(path) as temporary:
             figure.savefig(temporary, format="png", metadata={"Software": None})
@@ -94,37 +83,34 @@ def moments(scene: Scene) -> dict[str, float]:
     return dict(zip(MOMENTS, when, strict=True))
 
 
-def _seen(done: Whole, params: Settings) -> list[Moment]:
-    when = moments(done.scene)
+def _seen(done: Whole, params: Settings) -> Iterator[tuple[str, RgbdFrame, np.ndarray, np.ndarray]]:
+    """Name, picture, mask (H, W) and cloud (P, 3) of each moment."""
     times = done.clouds.time  # of the pictures that could be decoded
+    when = moments(done.scene)
     which = [int(np.argmin(np.abs(times - time))) for time in when.values()]
     numbers = [int(np.argmin(np.abs(done.view.times - times[k]))) for k in which]
     frames = masked_frames(done, params.cloud, numbers)
-    return [
-        Moment(name, frame.time, frame.color.copy(), mask, done.clouds.points[k])
-        for name, k, (frame, mask) in zip(when, which, frames, strict=True)
-    ]
+    for name, k, (frame, mask) in zip(when, which, frames, strict=True):
+        yield name, frame, mask, done.clouds.points[k]
 
 
-def _whole(
-    figure: Figure, done: Whole, facts: Facts, rows: list[PictureLine], params: Settings
-) -> None:
+def _whole(figure: Figure, done: Whole, facts: Facts, params: Settings) -> None:
     from sling2sim2real.drawing.canvas import key, mark  # imports Matplotlib
 
-    seen, start = _seen(done, params), facts["window_start_s"]
-    grid = figure.add_gridspec(5, len(seen), height_ratios=[0.88, 0.55, 0.92, 1.0, 0.55])
-    for column, moment in enumerate(seen):
+    start = facts["window_start_s"]
+    grid = figure.add_gridspec(5, len(MOMENTS), height_ratios=[0.88, 0.55, 0.92, 1.0, 0.55])
+    for column, (name, frame, mask, points) in enumerate(_seen(done, params)):
         axes = figure.add_subplot(grid[0, column])
-        axes.imshow(cv2.cvtColor(_overlaid(moment.color, moment.mask), cv2.COLOR_BGR2RGB))
-        axes.set_title(f"{moment.name}, {start + moment.time:.3f} s")
+        axes.imshow(cv2.cvtColor(_overlaid(frame.color, mask), cv2.COLOR_BGR2RGB))
+        axes.set_title(f"{name}, {start + frame.time:.3f} s")
         axes.set_axis_off()
         for row, (a, b) in enumerate(((1, 2), (0, 1)), start=1):
             axes = figure.add_subplot(grid[row, column])
-            _cloud(axes, done, moment, a, b, labels=column == 0)
+            _cloud(axes, done, frame.time, points, a, b, labels=column == 0)
     force = figure.add_subplot(grid[3, :])
     _force(force, done, facts)
     covered = figure.add_subplot(grid[4, :], sharex=force)
-    _coverage(covered, rows)
+    _coverage(covered, done.coverage)
     _events(covered, done, facts)
     key(
         figure,
@@ -148,11 +134,14 @@ def _overlaid(color: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return cv2.drawContours(large, outlines, -1, MASK, 1)
 
 
-def _cloud(axes: Axes, done: Whole, moment: Moment, a: int, b: int, labels: bool) -> None:
-    scene, hand = done.scene, done.signals.hand(moment.time)
-    axes.scatter(moment.points[:, a], moment.points[:, b], s=1.5, color=COLORS[1], linewidths=0)
+def _cloud(
+    axes: Axes, done: Whole, time: float, points: np.ndarray, a: int, b: int, labels: bool
+) -> None:
+    """Draw points (P, 3) and what is known around them along two axes of frame O."""
+    scene, hand = done.scene, done.signals.hand(time)
+    axes.scatter(points[:, a], points[:, b], s=1.5, color=COLORS[1], linewidths=0)
     for tip in scene.tips:
-        if scene.taut(moment.time):
+        if scene.taut(time):
             axes.plot([tip[a], hand[a]], [tip[b], hand[b]], color=COLORS[0], lw=0.8)
         if b == 2:
             axes.plot([tip[a]] * 2, [scene.floor, tip[b]], color="0.7", lw=2, zorder=0)
@@ -185,11 +174,6 @@ def _coverage(axes: Axes, rows: list[PictureLine]) -> None:
     time = [row.time for row in rows]
     axes.plot(time, [row.coverage for row in rows], color=COLORS[1], lw=1.2)
     axes.set(ylabel="band covered", ylim=(0, 1.05), xlabel="time since the first force [s]")
-    other = axes.twinx()
-    other.plot(time, [row.points for row in rows], color=COLORS[4], lw=0.8)
-    other.set(ylim=(0, None))
-    other.set_ylabel("points", color=COLORS[4])
-    other.grid(visible=False)
 
 
 def _events(axes: Axes, done: Whole, facts: Facts, named: bool = False) -> None:

@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sling2sim2real.simulator.interaction import interact
-from sling2sim2real.simulator.launch import launch
 from sling2sim2real.simulator.model import GRAVITY, ClampedBand
 from sling2sim2real.simulator.records import Grip
 from sling2sim2real.simulator.schedule import steps
@@ -51,18 +49,6 @@ def test_the_projectile_feels_no_wind(sling):
     assert distance == pytest.approx(fall(30.0 * 0.02 / 0.06), rel=0.02)
 
 
-def test_drag_differs_by_rollout_and_slows_the_recoil(strong_grip, episode):
-    """Three drags in one batch, each as if alone; the swing loses speed."""
-    drags = np.array([0.0, 2.0, 6.0])
-    both = interact(strong_grip, episode, neo(THETA, air_drag=drags))
-    for drag, line in zip(drags, both.center_line, strict=True):
-        alone = interact(strong_grip, episode, neo(THETA, air_drag=drag))
-        np.testing.assert_array_equal(alone.center_line[0], line)
-    swing = both.cloud_time > episode.release_time + 0.2
-    moved = np.abs(np.diff(both.center_line[:, swing, strong_grip.middle], axis=1)).sum((1, 2))
-    assert moved[0] > 1.05 * moved[1] > 1.05**2 * moved[2]
-
-
 def test_air_brakes_a_band_as_a_cylinder_across_the_wind_and_not_along_it(sling):
     """Speed v_t tanh(g t / v_t), v_t² = 2 m g / (rho C d L); end first it falls free."""
     light = replace(sling, clamped=(False, False), mass=2e-3, air_density=1.2)
@@ -81,11 +67,3 @@ def test_air_brakes_a_band_as_a_cylinder_across_the_wind_and_not_along_it(sling)
     done = stepped(light, table, neo(THETA), upright)
     drop = (upright[:, 2] - done.state[0, :, 2]).mean()
     assert drop == pytest.approx(GRAVITY * time**2 / 2, rel=5e-3)
-
-
-def test_air_takes_energy_from_a_recoil(sling, launch_setup):
-    """Little: the projectile is heavier and slower than a band alone."""
-    blown = (replace(sling, air_density=rho) for rho in (0.0, 1.2, 2.4))
-    draw = [-0.35, -0.15]
-    far = [launch(band, launch_setup, neo(THETA), draw).landing_y[0] for band in blown]
-    assert 0.99 * far[0] < far[2] < far[1] < 0.9999 * far[0]

@@ -47,51 +47,6 @@ def test_without_its_parameters_it_is_the_neo_hookean_law_to_the_bit(
             np.testing.assert_array_equal(getattr(plain, name), getattr(other, name))
 
 
-def test_each_parameter_has_its_effect(rubber, launch_setup):
-    """What stiffens a drawn band, what relaxes, and what a band that was stretched lacks."""
-    plain = launch(rubber, launch_setup, gum(), DRAW)
-    soft, stiff = (launch(rubber, launch_setup, gum(mooney_share=m), DRAW) for m in (0.5, -0.3))
-    assert soft.hold_force < 0.9 * plain.hold_force < 0.9 * stiff.hold_force
-    turned = launch(rubber, launch_setup, gum(upturn=0.2), DRAW)
-    assert turned.hold_force > 1.05 * plain.hold_force
-    memory = gum(relaxation=0.04)
-    histories = LaunchHistory(1.0, 0.1), LaunchHistory(1.0, 10.0), LaunchHistory(1.0, 600.0)
-    fresh, later, old = (
-        launch(rubber, replace(launch_setup, history=history), memory, DRAW)
-        for history in histories
-    )
-    assert fresh.hold_force > 1.03 * plain.hold_force > 1.06 * old.hold_force
-    assert later.hold_force == pytest.approx(plain.hold_force, rel=0.01)  # E is after ten seconds
-    assert later.speed < 0.995 * fresh.speed
-
-
-def test_flow_has_its_share_and_its_rate(rubber, launch_setup):
-    """A share that hardly flows is a stiffer band; at once, none; between, work is lost."""
-    setup = replace(launch_setup, history=LaunchHistory(4.0, 2.0))
-    plain, stiffer = (launch(rubber, setup, gum(mooney_share=0.0), DRAW), gum().values.copy())
-    stiffer[:, 0] *= 1.3
-    stiff = launch(rubber, setup, Parameters(RUBBER, stiffer), DRAW)
-    rates = np.array([-10.0, 1.0, 3.0, 12.0])
-    done = launch(rubber, setup, gum(flow=0.3, log_flow_rate=rates), DRAW)
-    assert done.hold_force[0] == pytest.approx(stiff.hold_force[0], rel=5e-3)
-    assert np.all(np.diff(done.hold_force) < 0) and done.hold_force[-1] > plain.hold_force
-    assert done.hold_force[-1] == pytest.approx(plain.hold_force[0], rel=2e-3)
-    per_force = done.speed**2 / done.hold_force  # of equally strong bands, what returns
-    assert per_force[2] < 0.97 * per_force[0]
-
-
-def test_softening_takes_from_what_was_stretched(rubber, launch_setup):
-    """A first draw is virgin and returns less; a draw below an earlier stretch is held by less."""
-    plain, first = (launch(rubber, launch_setup, gum(softening=s), DRAW) for s in (0.0, 0.4))
-    assert first.hold_force == pytest.approx(plain.hold_force, rel=1e-6)
-    assert first.speed < 0.95 * plain.speed
-    stretched = replace(rubber, stretched=2.2)
-    again = launch(stretched, launch_setup, gum(softening=0.4), DRAW)
-    assert again.hold_force < 0.95 * first.hold_force and again.speed < first.speed
-    none = launch(stretched, launch_setup, gum(), DRAW)
-    np.testing.assert_array_equal(none.landing_y, plain.landing_y)
-
-
 def test_each_launch_of_a_batch_has_what_its_band_had_seen(rubber, launch_setup):
     def launched(deepest, softening: float = 0.4):
         setup = replace(launch_setup, history=LaunchHistory(2.0, 1.0, deepest))

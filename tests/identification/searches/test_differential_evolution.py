@@ -1,14 +1,13 @@
 """Differential evolution is SciPy's, with nothing between."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import optimize
 
 from sling2sim2real.identification.objective.box import latin_hypercube
 from sling2sim2real.identification.searches.de import differential_evolution
-from tests.identification.searches.functions import batches_of, rosenbrock
+from tests.identification.searches.functions import batches_of
 
 
 def bowl(unit: np.ndarray) -> np.ndarray:
@@ -50,19 +49,3 @@ def test_its_points_are_those_of_scipy(
     budget = {"rollouts": population * (generations + 1), "seed": seed, "population": population}
     found = batches_of(differential_evolution, bowl, dimension, **budget, **shared)
     np.testing.assert_array_equal(np.stack(found), np.stack(expected))
-
-
-@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
-def test_a_failing_evaluation_surfaces(error: type[BaseException]) -> None:
-    def broken(unit: np.ndarray):
-        raise error
-
-    with pytest.raises(error):
-        batches_of(differential_evolution, broken, 2, 15)
-
-
-def test_what_scipy_raises_surfaces() -> None:
-    with pytest.raises(ValueError, match="mutation"):
-        batches_of(differential_evolution, rosenbrock, 2, 15, mutation=(0.5, 7.0))
-    with pytest.raises(ValueError, match="population supplied"):
-        batches_of(differential_evolution, rosenbrock, 2, 15, population=3)

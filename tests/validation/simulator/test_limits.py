@@ -1,7 +1,5 @@
 """The checks of `sling verify` keep their limits, at smaller sizes."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -104,26 +102,3 @@ def test_random_thetas_are_finite_or_fail_by_name(bench):
 def test_launches_of_random_rubber_are_finite_or_fail_by_name(bench):
     points = rubber.random_points(bench, 64)
     assert not robustness.survey_launches(bench, rubber.rubber_of(bench), points).not_finite
-
-
-def test_what_is_not_finite_and_not_marked_is_counted(bench, monkeypatch):
-    true = robustness.interact
-
-    def broken(*args, **options):
-        done = true(*args, **options)
-        return replace(done, force=np.nan * done.force, failure=[None] * len(done.failure))
-
-    monkeypatch.setattr(robustness, "interact", broken)
-    points = rubber.random_points(bench, 4)
-    assert robustness.survey(bench, rubber.rubber_of(bench), points).not_finite == 4
-
-
-def test_samples_are_as_many_as_asked_for_and_lie_where_they_should(bench):
-    for count in (3, launching.COUNT + 5):
-        theta, draws = launching.random_launches(count)
-        assert theta.shape == (count, 5) and draws.shape == (count, 2)
-    thetas = robustness.on_boundary(bench, 20)[32:]
-    for name in robustness.THETA:
-        bounds = getattr(bench.params.parameters, name)
-        at = np.isclose(thetas.column(name)[:, None], [bounds.low, bounds.high])
-        assert at.sum(0).tolist() == [2, 2]

@@ -163,7 +163,7 @@ def ranked(params: Params, method: str, dips: Sequence[Dip], seed: Sequence[int]
     truth = virtual_band.coordinates.parameters(virtual_band.phi[None])
     landed = outcome(draw + off[:1], truth).landing_y[0]
     landings = outcome(draw + off[1:], samples).landing_y
-    below = part_below(outcome.coordinates, virtual_band.phi)
+    below = part_below(outcome.coordinates, virtual_band.phi, rng.random())
     if np.isfinite(landed) and np.isfinite(landings).mean() > LANDED:
         launch = float(part_below(landings[np.isfinite(landings)], landed))
     else:

@@ -1,4 +1,8 @@
-"""README's table and sentences of results, of the committed campaigns alone."""
+r"""README's table and sentences of results, of the committed campaigns alone.
+
+python -m validation.campaigns.ablations --recordings 10 --seeds 1 --preset large \
+        --methods posterior paper package_si real2sim2real --report reports/validation/headline.json
+"""
 
 from __future__ import annotations
 
@@ -8,29 +12,29 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.layout import ROOT
-from sling2sim2real.simulator.rubber import COROTATED
-from validation.campaigns import ablations, landings
+from validation.campaigns import landings
 from validation.campaigns.rig_scores import TARGETS
-from validation.campaigns.runner import OURS, read
+from validation.campaigns.runner import PAPER, POSTERIOR, read
 from validation.reports import paragraph, row
 
-ENGINE = Path("reports/validation/law-corotated.json")
+SAME_PULL = Path("reports/validation/headline.json")
 BANDS = {"band1": "silicone", "band2": "natural rubber that softens", "band3": "latex"}
-USUAL_ROWS = {  # methods of the usual campaign, which has another law for all but the last
-    "package_si": "Package SI, neo-Hookean law",
-    "real2sim2real": "Real2Sim2Real, neo-Hookean law",
-    OURS: "**`posterior`, the same pull**",
+ROWS = {  # by the paper's pull
+    PAPER: "the paper's method",
+    "package_si": "Package SI",
+    "real2sim2real": "Real2Sim2Real",
+    POSTERIOR: "**`posterior`, the same pull**",
 }
 
 
 def block() -> list[str]:
     """The table by the campaigns, and a sentence on the held-out rubbers."""
-    usual, engine = read(ROOT / ablations.REPORT), read(ROOT / ENGINE)
+    same = read(ROOT / SAME_PULL)
     rubbers = {name: read(ROOT / landings.report_of(name)) for name in ("bands", "sealed")}
     return [
-        *table(usual, engine, dips(rubbers["bands"]["recordings"])),
+        *table(same, dips(rubbers["bands"]["recordings"])),
         "",
-        *paragraph(differences(usual, engine)),
+        *paragraph(differences(same)),
         "",
         *landings.sentence(rubbers["sealed"]),
     ]
@@ -45,11 +49,11 @@ def each_of(content: dict, method: str) -> dict[str, np.ndarray]:
 
 
 def dips(recordings: list[dict]) -> dict[str, np.ndarray]:
-    """The same of our method by the pull with dips, of the campaign of landings."""
+    """The same of `posterior` by the pull with dips, of the campaign of landings."""
     chosen = [
         line
         for line in recordings
-        if (line["pull"], line["method"]) == ("informative", OURS)
+        if (line["pull"], line["method"]) == ("informative", POSTERIOR)
         and not (line["worn"] or line["launched"] or "failed" in line)
     ]
     return {
@@ -73,23 +77,21 @@ def line(words: str, each: dict[str, np.ndarray]) -> str:
     return row(words, *map(cell, each.values()), f"{mean:.1f}")
 
 
-def table(usual: dict, engine: dict, by_dips: dict[str, np.ndarray]) -> list[str]:
+def table(same: dict, by_dips: dict[str, np.ndarray]) -> list[str]:
     """Mean miss, least and most recording [cm], by method and band.
 
     Args:
-        usual: The campaign of all methods.
-        engine: That of the paper's method by the law of its engine, COROTATED.
-        by_dips: Of our method by the pull with dips.
+        same: The campaign of all methods on the same recordings.
+        by_dips: Of `posterior` by the pull with dips.
     """
     heads = (f"{band}, {kind}" for band, kind in BANDS.items())
     rows = [
         row("mean miss (least, most recording) [cm]", *heads, "mean of the bands"),
         row("---", *["---:"] * (len(BANDS) + 1)),
     ]
-    paper = engine, COROTATED, "the paper's method, law of its engine"
-    for content, method, words in (paper, *((usual, *pair) for pair in USUAL_ROWS.items())):
-        each, rollouts = each_of(content, method), content["settings"]["rollouts"][method]
-        budget = "" if method == OURS else f", {rollouts:,} rollouts"
+    for method, words in ROWS.items():
+        each, rollouts = each_of(same, method), same["settings"]["rollouts"][method]
+        budget = "" if method == POSTERIOR else f", {rollouts:,} rollouts"
         rows.append(line(f"{words}{budget}, {count(each)} recordings", each))
     return [*rows, line(f"**`posterior`, dips**, {count(by_dips)} other recordings", by_dips)]
 
@@ -99,15 +101,16 @@ def count(each: dict[str, np.ndarray]) -> int:
     return min(map(len, each.values()))
 
 
-def differences(usual: dict, engine: dict) -> str:
-    """How ours by the paper's pull compares with the paper's method on the same recordings."""
-    theirs, ours = each_of(engine, COROTATED), each_of(usual, OURS)
-    ours = {band: each[: len(theirs[band])] for band, each in ours.items()}
-    more = [f"{np.nanmean(ours[band] - theirs[band]):+.1f}" for band in BANDS]
-    mean = np.mean([np.nanmean(each) for each in ours.values()])
+def differences(same: dict) -> str:
+    """How `posterior` compares with the paper's method by the paper's pull, band by band."""
+    theirs, ours = each_of(same, PAPER), each_of(same, POSTERIOR)
+    more = {band: np.nanmean(ours[band] - theirs[band]) for band in BANDS}
+    signs = {bool(value > 0) for value in more.values()}
+    shown = "no difference is shown" if len(signs) > 1 else "all bands agree"
     text = (
         f"By the same pull, on the same {count(theirs)} recordings, `posterior` misses by"
-        f" {listed(more)} cm more than the paper's method, {mean:.1f} cm in the mean."
+        f" {listed([f'{value:+.1f}' for value in more.values()])} cm more than the paper's method:"
+        f" {shown}."
     )
     return text.replace("-", "−")
 

@@ -13,9 +13,15 @@ from scipy.stats import binomtest, kstest
 BINS, LEVEL = 10, 0.9
 
 
-def part_below(samples: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """Share of samples (M, ...) below the truth (...), each at the middle of its place."""
-    return (np.sum(samples < truth, axis=0) + 0.5) / (len(samples) + 1)
+def part_below(samples: np.ndarray, truth: np.ndarray, place: float = 0.5) -> np.ndarray:
+    """Share of samples (M, ...) below the truth (...).
+
+    Args:
+        place: Of the truth among the samples that equal it, from 0 to 1; drawn evenly, the rank of
+            a parameter that is often exactly 0 is even too.
+    """
+    equal = np.sum(samples == truth, axis=0) + 1
+    return (np.sum(samples < truth, axis=0) + place * equal) / (len(samples) + 1)
 
 
 def summary(parts: np.ndarray) -> dict:

@@ -92,8 +92,9 @@ def _about(path: Path) -> EpisodeFile:
 def _table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame:
     """Columns time, `columns` and maybe opening, all finite, time increasing. Raises UserError."""
     try:
-        options = {"skipinitialspace": True, "skip_blank_lines": False, "keep_default_na": False}
-        table = pd.read_csv(path, dtype=str, **options).fillna("")
+        table = pd.read_csv(
+            path, dtype=str, skipinitialspace=True, skip_blank_lines=False, keep_default_na=False
+        ).fillna("")
     except (OSError, ValueError) as error:  # pandas' own errors are ValueErrors
         message = getattr(error, "strerror", None) or error
         raise UserError(f"{path}: cannot be read ({one_line(message)[:120]})") from error

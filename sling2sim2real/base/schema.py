@@ -96,6 +96,11 @@ def _is_name(text: str) -> str:
     return text
 
 
+def _is_folder(text: str) -> str:
+    _is_name(text.replace("-", "_"))
+    return text
+
+
 def _is_ascending(pair: tuple[float, float]) -> tuple[float, float]:
     if not pair[0] < pair[1]:
         raise refusal(f"the first must be less than the second, got {list(pair)}")
@@ -123,6 +128,7 @@ UNIQUE = AfterValidator(_has_no_twins)
 UNIT = AfterValidator(_has_unit_length)
 
 Name = Annotated[str, AfterValidator(_is_name)]
+FolderName = Annotated[str, AfterValidator(_is_folder)]  # such as band1-dips
 Names = Annotated[tuple[Name, ...], LIST, UNIQUE]
 Seed = Annotated[int, Range(0, 2**31 - 1)]
 Metres = Annotated[float, Range(-10, 10)]

@@ -32,7 +32,7 @@ from sling2sim2real.quantities import rounded
 from sling2sim2real.simulator.launch import Launches
 
 FILE = "samples.parquet"
-STEPS = np.diag([0.02, 0.02, 0.1])  # of log strength, mooney_share, log damping_time
+STEPS = np.diag([0.02, 0.02, 0.1])  # by which _moved measures it
 REPLAYED = 3  # from the weakest to the strongest
 FEWEST = 4  # draws of a sample that land
 
@@ -100,44 +100,45 @@ def write(
 def carried(model: CalibratedBand, chain: SpringChain, points: np.ndarray) -> list[SpringChain]:
     """The chain of each θ of `points` (M, P), by the sensitivity of the matched one."""
     draws, ours = draws_of(model)
-    there = _told(MujocoBand(chain).launches(draws))
+    there, best = _told(MujocoBand(chain).launches(draws)), _told(ours)
     slopes = np.stack(
         [
-            (_told(MujocoBand(_moved(chain, step)).launches(draws)) - there) / step.sum()
+            (_told(MujocoBand(_moved(chain, step)).launches(draws)) / there - 1) / step.sum()
             for step in STEPS
         ],
         axis=1,
     )
+    limits = np.repeat([HOLD_LIMIT, LANDING_LIMIT], len(draws))
     theirs = model.launches(np.tile(draws, (len(points), 1)), np.repeat(points, len(draws), axis=0))
     result = []
     for number in range(len(points)):
-        one = theirs[np.arange(len(draws)) + number * len(draws)]
-        change = _told(one) - _told(ours)
-        known = np.isfinite(change) & np.isfinite(slopes).all(axis=1)
+        ratio = _told(theirs[np.arange(len(draws)) + number * len(draws)]) / best
+        known = np.isfinite(ratio) & np.isfinite(slopes).all(axis=1)
         if known.sum() < 2 * FEWEST:
             raise UserError(f"samples: launches of sample {number} fail; export without samples")
-        step = np.linalg.lstsq(slopes[known], change[known], rcond=None)[0]
+        weight = 1 / (limits * ratio)[known]
+        step = np.linalg.lstsq(slopes[known] * weight[:, None], (ratio[known] - 1) * weight)[0]
         moved = _moved(chain, step)
         result.append(replace(moved, step=min(chain.step, moved.stable_step)))
     return result
 
 
 def _told(launched: Launches | Sequence[Shot]) -> np.ndarray:
-    """Logarithms of hold forces and landings, each in what is asked of it, shape (2 N,)."""
+    """Hold forces, then landings, shape (2 N,)."""
     if isinstance(launched, Launches):
-        hold, landing = launched.hold_force, launched.landing_y
-    else:
-        hold, landing = np.array([[shot.hold_force, shot.landing] for shot in launched]).T
-    with np.errstate(invalid="ignore"):
-        return np.append(np.log(hold) / HOLD_LIMIT, np.log(landing) / LANDING_LIMIT)
+        return np.append(launched.hold_force, launched.landing_y)
+    return np.array([[shot.hold_force, shot.landing] for shot in launched]).T.ravel()
 
 
 def _moved(chain: SpringChain, step: np.ndarray) -> SpringChain:
-    """The chain a step (3,) away: log strength, mooney_share, log damping_time."""
-    strength, damping = np.exp(step[[0, 2]])
+    """The chain a step (3,) away: of K and K m in K, of log tau.
+
+    Pull and stored energy are linear in K and K m, so that far samples are carried well too.
+    """
+    strength = 1 + step[0]
     return replace(
         chain,
         strength=float(chain.strength * strength),
-        mooney_share=float(chain.mooney_share + step[1]),
-        damping_time=float(chain.damping_time * damping),
+        mooney_share=float((chain.mooney_share + step[1]) / strength),
+        damping_time=float(chain.damping_time * np.exp(step[2])),
     )

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError, model_validator
 from ruamel.yaml import YAML, YAMLError
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.schema import Name, Section, explained, refusal
+from sling2sim2real.base.schema import FolderName, Name, Section, explained, refusal
 from sling2sim2real.base.target import TARGET_AREA
 from sling2sim2real.settings.identification import (
     LossParams,
@@ -72,7 +72,7 @@ class Settings(Section):
     policy: PolicyParams = Field(default_factory=PolicyParams)
     launch: LaunchParams = Field(default_factory=LaunchParams)
     trials: TrialsParams = Field(default_factory=TrialsParams)
-    bands: dict[str, BandParams] = {}  # a folder's name may have a hyphen
+    bands: dict[FolderName, BandParams] = {}
 
     @classmethod
     def default(cls, **changes: Mapping) -> Self:

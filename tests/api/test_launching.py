@@ -49,6 +49,9 @@ def test_the_interval_holds_what_samples_say(world, aimed) -> None:
     assert "has not converged" in str(confidence) and "have changed since" in str(stale)
     assert [hazard.about for hazard in aimed.warnings] == ["confidence"]
     assert "no samples" in str(aimed.warnings[0])
+    edge = {"settled": False, "edges": {"mooney_share": "upper"}}
+    beyond = Identification(**arguments, samples=near, confidence=edge)
+    assert "Mooney share is at the upper end" in str(aim(beyond, 2.0).warnings[0])
     few = Identification(
         **arguments, samples=near, confidence={"settled": True, "effective_samples": 12.0}
     )

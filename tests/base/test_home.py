@@ -46,10 +46,3 @@ def test_a_folder_of_another_user_is_not_taken(folder, monkeypatch) -> None:
     monkeypatch.setattr("os.lstat", lambda path: other)
     with pytest.raises(UserError, match="set HOME to a folder .* is another user's"):
         home.settle()
-
-
-def test_where_nothing_can_be_written_one_line_says_so(monkeypatch) -> None:
-    monkeypatch.setenv("HOME", "/proc/nobody")
-    monkeypatch.setattr("tempfile.tempdir", "/proc/nothing")
-    with pytest.raises(UserError, match="set HOME to a folder that can be written"):
-        home.settle()

@@ -42,13 +42,6 @@ def test_a_line_says_rate_and_time_left(clock, capsys: pytest.CaptureFixture) ->
     assert [f"policy-band1-x {line}" for line in lines] == [first, second]
 
 
-def test_hours_left_have_minutes(clock, capsys: pytest.CaptureFixture) -> None:
-    summary = Progress("x", 1000, "rollouts")
-    clock.now += 10.0
-    summary.advance(1)
-    assert capsys.readouterr().err.endswith("2:46:30 left\n")
-
-
 def test_lines_are_told_no_more_often_than_asked_but_the_last_is(clock, capsys) -> None:
     summary = Progress("x", 26, "iterations", every=1.0)
     for _ in range(26):

@@ -39,6 +39,11 @@ CASES = [
     ({"recoil": 0.03}, NO, "does not match the recoil"),
     ({"disagreement": 2.6, "odd": "pull 2 of b.mcap"}, CARE, "pull 2 of b.mcap"),
     ({"at_sides": (("relaxation", "upper end of its bounds, 0 to 20 %"),)}, CARE, "relaxation"),
+    (
+        {"settled": False, "at_sides": (("flow", "upper end of its bounds, 0 to 60 %"),)},
+        CARE,
+        "fitted flow is at the upper end",
+    ),
     ({"stretch": 1.7}, CARE, "1.70 times its length, the recording only to 1.60"),
     ({"stretch": 2.2}, NO, "2.20 times"),
     ({"hold_force": 28.0}, CARE, "28.0 N"),

@@ -31,20 +31,6 @@ def test_a_wrong_unit_is_named(kind, text: str, likely: str) -> None:
     assert refusal(kind, text).endswith(f"which looks like {likely}")
 
 
-@pytest.mark.parametrize(
-    ("kind", "text", "value"),
-    [
-        (mass, "0.0408", 0.0408),
-        (rest_length, "0.52", 0.52),
-        (target, "1.925", 1.925),
-        (draw, "-0.30,-0.17", (-0.30, -0.17)),
-        (draw, "-0.30,0", (-0.30, 0.0)),
-    ],
-)
-def test_what_is_in_range(kind, text: str, value) -> None:
-    assert kind(text) == value
-
-
 @pytest.mark.parametrize("text", ["0", "-1", "nan", "inf", "a", "", "1e9", "40.8g"])
 def test_what_is_no_quantity_of_any_unit(text: str) -> None:
     for kind in (mass, rest_length, diameter, target):

@@ -1,6 +1,5 @@
 """Commands that run a module of a checkout, with their arguments as given."""
 
-import importlib
 import os
 import sys
 
@@ -8,7 +7,6 @@ import pytest
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli import checkout
-from tests.project import ROOT
 
 
 class Replaced(Exception):
@@ -44,26 +42,3 @@ def test_it_runs_the_module_in_the_projects_folder(command, started, tmp_path, m
 def test_elsewhere_it_is_refused(tmp_path) -> None:
     with pytest.raises(UserError, match="sling flow: needs a checkout of the project: no dvc.yaml"):
         checkout.run("flow", [], tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("module", "line", "attribute", "value"),
-    [
-        ("pipeline.flow.__main__", "theta@band1 --workers 2", "targets", ["theta@band1"]),
-        ("pipeline.flow.__main__", "--workers 2", "workers", 2),
-        ("pipeline.flow.__main__", "--dask tcp://10.0.0.5:8786", "dask", "tcp://10.0.0.5:8786"),
-        ("pipeline.flow.server", "--port 4201", "port", 4201),
-        ("validation.verify", "--device cuda:0", "device", "cuda:0"),
-        ("validation.bench", "--law rubber", "law", "rubber"),
-        ("validation.bench", "--json", "json", True),
-    ],
-)
-def test_their_options_are_understood(module, line, attribute, value) -> None:
-    parsed = importlib.import_module(module).parser().parse_args(line.split())
-    assert getattr(parsed, attribute) == value
-
-
-def test_each_command_has_its_module() -> None:
-    for module, _ in checkout.COMMANDS.values():
-        place = ROOT.joinpath(*module.split("."))
-        assert place.with_suffix(".py").is_file() or (place / "__main__.py").is_file()

@@ -49,26 +49,6 @@ def test_the_help_documents_each_exit_status(capsys) -> None:
     assert [int(line.split()[0]) for line in message.splitlines() if line.strip()] == [*EXITS]
 
 
-def test_the_documented_commands_are_understood() -> None:
-    parse = cli.parser().parse_args
-    new = parse("fit o.mcap o_2.mcap --mass 0.0408 --name orange".split())
-    assert (new.given, new.mass) == ([Path("o.mcap"), Path("o_2.mcap")], 0.0408)
-    assert (new.diameter, new.rest_length, new.policy) == (None, None, False)
-    assert parse("fit bands/orange --policy".split()).policy
-    assert parse("check o.mcap --json".split()).json
-    assert parse("check o.mcap --pull 2".split()).pull == 2
-    assert parse("plan bands/orange --pulls 3".split()).pulls == 3
-    planned = parse("plan --rest-length 0.5 --draw=-0.30,-0.17".split())
-    assert (planned.draw, planned.band, planned.out) == ((-0.30, -0.17), None, None)
-    launched = parse("launch bands/orange --theta t.json --draw=-0.30,-0.17".split())
-    assert (launched.theta, launched.draw) == (Path("t.json"), (-0.30, -0.17))
-    aimed = parse("aim reports/bands/band1 --target 1.925".split())
-    assert (aimed.target, aimed.json, aimed.force) == (1.925, False, False)
-    seen = parse("observe bands/orange --draw=-0.3,-0.1 --landing 2 --error 0.002 --check".split())
-    assert (seen.landing, seen.error, seen.check, seen.again) == (2.0, 0.002, True, False)
-    assert [parse(["export", "b", "--to", to]).to for to in ("mujoco", "mjcf")] == 2 * ["mjcf"]
-
-
 def test_a_command_line_that_makes_no_sense(refused) -> None:
     for arguments, expected in (
         ("", "required: COMMAND"),

@@ -95,17 +95,3 @@ def test_drift_finds_a_change_beyond_the_intervals() -> None:
     assert drift.changes({"may": recording(2.0e5), "june": recording(2.06e5)}) == []
     changed = drift.changes({"may": recording(2.0e5), "june": recording(1.7e5)})
     assert changed == ["youngs_modulus: -15 % from may to june"]
-
-
-@pytest.mark.slow
-def test_drift(copy: Path, tmp_path: Path) -> None:
-    """On two recordings of one band, a minute apart."""
-    recordings = [
-        ROOT.parent / "shared/recordings" / name for name in ("orange.mcap", "orange_2.mcap")
-    ]
-    if not recordings[0].exists():
-        pytest.skip("../shared/recordings is not there")
-    command = (copy / "examples/drift.py", "--mass", "0.0408", *recordings)
-    done = python(*command, folder=tmp_path, PYTHONPATH=str(copy))
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.count("damping_product") >= 2

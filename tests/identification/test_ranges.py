@@ -3,7 +3,7 @@
 import pytest
 
 from pipeline.params import load
-from sling2sim2real.identification.results.ranges import SearchedRange, searched
+from sling2sim2real.identification.results.ranges import SearchedRange, at_edges, searched
 from tests.project import DEFAULTS
 
 LOG, SHARE = SearchedRange(1e-4, 1e-2, "log"), SearchedRange(0.0, 1.0)
@@ -24,6 +24,11 @@ LOG, SHARE = SearchedRange(1e-4, 1e-2, "log"), SearchedRange(0.0, 1.0)
 def test_within_a_hundredth_of_an_end_is_its_edge(box, value, edge) -> None:
     assert box.edge(value) == edge
     assert box.at(box.place(value)) == pytest.approx(value)
+
+
+def test_values_of_theta_at_an_edge_are_named_and_a_natural_0_is_none() -> None:
+    theta = {"mooney_share": 0.9, "softening": 0.0, "upturn": 0.1, "poissons_ratio": 0.3}
+    assert at_edges(load(DEFAULTS), "posterior", theta) == {"mooney_share": "upper"}
 
 
 def test_a_methods_own_bounds_stand_and_what_it_fixes_does_not() -> None:

@@ -157,18 +157,6 @@ def test_the_card_is_the_committed_one(seeing) -> None:
     expect_golden(json.dumps(content, indent=2) + "\n", Path(__file__).parent / "golden/card.json")
 
 
-def test_a_policy_that_does_not_see_the_projectile_names_no_such_input(trained, seeing) -> None:
-    content = written(seeing, FIGURES)
-    assert content.pop("projectile")["trained_at"] == pytest.approx(toy.START)
-    assert content == written(trained, FIGURES)
-
-
-def test_a_policy_that_never_hits_has_no_errors_in_its_card(trained) -> None:
-    never = {"converged": False, "mean_error_m": np.nan, "max_error_m": float("nan")}
-    content = written(trained, {**FIGURES, **never, "failed_targets": 256})
-    assert content["training"]["mean_error_m"] is content["training"]["max_error_m"] is None
-
-
 def test_what_is_checked_is_what_the_card_says(trained) -> None:
     checked = PolicyCheck(0.004, 0.011, {})
     assert figures(trained, checked).keys() == FIGURES.keys()

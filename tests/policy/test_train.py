@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 import torch
 
-from sling2sim2real.base.progress import Progress, parse
-from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE
 from sling2sim2real.launching.surface.simulated import SimulatedLandings
 from sling2sim2real.policy.train import Trained, train
@@ -110,15 +108,6 @@ def test_a_policy_that_sees_the_projectile_hits_too(seeing, trained, settings) -
     assert first.shape == (settings.hidden[0], 3) and not same(seeing, trained)
 
 
-def test_without_a_launch_that_lands_it_says_so(settings) -> None:
-    box = {"draw_y": toy.DRAW_Y, "draw_z": toy.DRAW_Z, "size": (5, 5), "max_force": 15.0}
-    trained = train(LandingMap.simulate(toy.broken, **box).surface, short(settings))
-    assert np.isnan(trained.mean_error)
-    assert trained.failures == {"the simulation did not converge": 2 * 4 * 64}
-    assert trained.curve["failed_targets"] == [256.0, 256.0]
-    assert np.isfinite(trained.policy.draws(np.array([1.9]))).all()
-
-
 @pytest.mark.parametrize("first", [1, 8])
 def test_a_landing_that_is_no_number_is_refused(toy_map, settings, first: int) -> None:
     """Neither a policy of the iteration before nor a traceback of PyTorch comes of it."""
@@ -136,13 +125,3 @@ def test_a_landing_that_is_no_number_is_refused(toy_map, settings, first: int) -
 
     with pytest.raises(ValueError, match="NaN"):
         train(Broken(), short(settings))
-
-
-def test_each_iteration_is_logged(toy_map, settings, tmp_path) -> None:
-    log = tmp_path / "progress.log"
-    some = short(settings, iterations=3)
-    trained = train(toy_map.surface, some, Progress("x", 3, "iterations", log))
-    steps = [parse(f"x {line}") for line in log.read_text().splitlines()[1:]]
-    assert [step.done for step in steps] == [1, 2, 3]
-    errors = [f"mean error {100 * error:.2f} cm" for error in trained.curve["mean_error"]]
-    assert [step.facts[0] for step in steps] == errors

@@ -17,7 +17,7 @@ from validation.campaigns.landings import (
     jobs,
 )
 from validation.campaigns.rig_scores import TARGETS
-from validation.campaigns.runner import OURS
+from validation.campaigns.runner import POSTERIOR
 from validation.projects import DEFAULTS
 from validation.rubbers import DEVELOP, SEALED, UNSEEN_LAWS, rubbers
 
@@ -26,7 +26,7 @@ def test_each_band_is_recorded_by_both_pulls_and_once_after_it_was_drawn() -> No
     for name, (seed, bands, count, states) in SETS.items():
         every = jobs(name)
         assert len(set(every)) == len(every) and {job.seed for job in every} == {seed}
-        other = [job for job in every if job.launched or job.method != OURS]
+        other = [job for job in every if job.launched or job.method != POSTERIOR]
         assert {job.kind for job in other} == {
             "paper, virgin, the paper's method",
             "informative, virgin, the paper's method",

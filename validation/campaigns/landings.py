@@ -39,7 +39,7 @@ from validation.campaigns.rig_scores import (
     sling_of,
     summaries,
 )
-from validation.campaigns.runner import OURS, PAPER, job_of
+from validation.campaigns.runner import PAPER, POSTERIOR, job_of
 from validation.density import Calibrated, calibrated_by
 from validation.projects import DEFAULTS
 from validation.reports import paragraph, plain, row, write_report
@@ -72,7 +72,7 @@ class OneRecording:
     pull: str
     worn: bool
     number: int
-    method: str = OURS
+    method: str = POSTERIOR
     launched: bool = False
 
     @property

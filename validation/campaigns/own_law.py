@@ -33,7 +33,7 @@ from sling2sim2real.simulator.interaction import Rollouts, interact
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.replay import recorded_force
 from validation.campaigns import runner
-from validation.campaigns.runner import OURS
+from validation.campaigns.runner import POSTERIOR
 from validation.density import calibrated_by
 from validation.projects import DEFAULTS
 from validation.ranks import part_below, summary
@@ -163,7 +163,7 @@ def ranked(params: Params, method: str, dips: Sequence[Dip], seed: Sequence[int]
     truth = virtual_band.coordinates.parameters(virtual_band.phi[None])
     landed = outcome(draw + off[:1], truth).landing_y[0]
     landings = outcome(draw + off[1:], samples).landing_y
-    below = part_below(outcome.coordinates, virtual_band.phi)
+    below = part_below(outcome.coordinates, virtual_band.phi, rng.random())
     if np.isfinite(landed) and np.isfinite(landings).mean() > LANDED:
         launch = float(part_below(landings[np.isfinite(landings)], landed))
     else:
@@ -187,7 +187,7 @@ class Drawn:
 def identified(job: Drawn) -> dict:
     params = load(DEFAULTS)
     dips = params.plan.dips if job.pull == "informative" else ()
-    return ranked(params, OURS, dips, [19, PULLS.index(job.pull), job.number])
+    return ranked(params, POSTERIOR, dips, [19, PULLS.index(job.pull), job.number])
 
 
 def figures(lines: list[dict]) -> dict:

@@ -26,7 +26,7 @@ from sling2sim2real.base.pool import Pool
 from validation.reports import plain
 
 THREADS = ("SLING_WORKERS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-OURS, PAPER = "posterior", "paper"  # methods of params.yaml
+POSTERIOR, PAPER = "posterior", "paper"  # methods of params.yaml
 Job = TypeVar("Job")
 Result = dict[str, object]
 

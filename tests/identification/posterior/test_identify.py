@@ -96,6 +96,12 @@ def test_the_truth_is_found_where_no_prior_pulls(exact, monkeypatch):
     assert abs(gap[0]) < 4e-3 and abs(gap[1]) < 0.15
 
 
+def test_a_value_at_an_edge_is_not_settled(first):
+    assert first.settled == first.fit.settled
+    beyond = confidence.confidence(replace(first, edges={"mooney_share": "upper"}))
+    assert not beyond["settled"] and beyond["edges"] == {"mooney_share": "upper"}
+
+
 def test_the_loss_factors_prior_pulls_towards_it_and_no_farther(first):
     mean = SPACE.expected[SPACE.names.index(LOSS)]
     assert mean < first.fit.phi[1] < TRUE[1]

@@ -83,6 +83,24 @@ def test_a_coordinate_that_nothing_shows_keeps_its_prior(valley):
     assert np.sqrt(np.mean(last**2)) == pytest.approx(5.0, rel=0.15)
 
 
+@pytest.mark.parametrize("seen_at", [0.0, 3.0, 12.0])
+def test_a_rectified_coordinate_is_exactly_at_its_end_as_often_as_the_integral_says(seen_at):
+    """Half of the prior is there; evidence of 2 steps weighs that against the other half."""
+
+    def told(x: np.ndarray) -> np.ndarray:
+        return np.column_stack([residuals(x)[:, :2], (np.maximum(x[:, 2], 0) - seen_at) / 2])
+
+    evidence = target(told)
+    lowest = np.array([0.0, 0.0, -np.inf])
+    evidence.coordinates = replace(evidence.coordinates, lowest=lowest)
+    last = samples_of(evidence, 1.0, 1)[0][:, 2] / SIZE[2]
+    x = np.linspace(0, 50, 5001)
+    above = np.sum(stats.norm.pdf(x, 0, 5) * np.exp(-0.5 * ((x - seen_at) / 2) ** 2)) * x[1]
+    at_end = 0.5 * np.exp(-0.5 * (seen_at / 2) ** 2)
+    assert last.min() >= 0
+    assert np.mean(last == 0) == pytest.approx(at_end / (at_end + above), abs=0.12)
+
+
 def test_chains_keep_a_normal_density():
     """A thousand ends: the deviation of 11 normal coordinates within 2 %."""
     start = np.random.default_rng(0).normal(size=(1000, 11))

@@ -35,8 +35,8 @@ test: setup           # the tests that prove that it works: five minutes
 test-all: setup       # all tests but the campaigns: slow ones too, and ten times the examples
 	.venv/bin/python -m pytest -m 'not validation' --hypothesis-profile thorough
 
-durations: setup      # which tests take more than three CPU-seconds and are not marked slow
-	.venv/bin/python -m pytest -p tests.durations
+durations: setup      # which tests take longest
+	.venv/bin/python -m pytest --durations=30
 
 lint: setup           # ruff; basedpyright: types; import-linter and deptry: who imports what; codespell; code lines
 	.venv/bin/ruff check .

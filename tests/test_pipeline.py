@@ -199,23 +199,6 @@ def test_the_python_of_the_readme_runs(project: Copy) -> None:
     assert float(message[1]) > 0 and len(message[2].strip("()").split(",")) == 2
 
 
-def test_python_identifies_what_the_stage_does(project: Copy) -> None:
-    """From the same episode and launch, without the project's files."""
-    code = """
-from pathlib import Path
-import sling2sim2real as s2s
-run = s2s.Identification.load("reports/bands/band1")
-settings = s2s.Settings.load("params.yaml")
-episode = s2s.Episode.load(Path("data/episodes/band1/plain/1"))
-error = settings.trials.actuation_error
-seen = s2s.Observed((-0.3, -0.17), error, 2.0)
-found = s2s.identify([episode], run.band, launches=[seen], settings=settings)
-assert found.theta == run.theta, (found.theta, run.theta)
-assert (found.samples == run.samples).all() and found.intervals == run.intervals
-"""
-    project("python", "-c", code)
-
-
 def test_a_second_run_does_nothing(project: Copy) -> None:
     assert project.dvc("repro") == set()
 

@@ -67,10 +67,3 @@ def test_what_no_simulation_can_follow_is_infinite(world, episode) -> None:
 def test_wrong_points(world, episode, points, message: str) -> None:
     with pytest.raises(UserError, match=message):
         Objective(world, [episode])(points)
-
-
-def test_wrong_methods(world, episode) -> None:
-    with pytest.raises(UserError, match="method nope: settings.methods has"):
-        Objective(world, [episode], method="nope")
-    with pytest.raises(UserError, match="at least one"):
-        Objective(world, [])

@@ -1,15 +1,7 @@
 """The project's params.yaml as an object, with other values, and wherever one works."""
 
-import pytest
-
 from sling2sim2real import Settings
-from sling2sim2real.base.errors import UserError
 from tests.project import DEFAULTS
-
-
-def test_a_fork_of_any_width_will_do() -> None:
-    """Whatever bands the project has."""
-    assert Settings.default(setup={"fork_width": 1.5}).setup.fork_width == 1.5
 
 
 def test_changes_reach_any_depth_and_nothing_else() -> None:
@@ -34,17 +26,3 @@ def test_a_file_of_ones_own(tmp_path) -> None:
     mine = Settings.load(tmp_path / "mine.yaml")
     assert mine.setup == Settings.default(setup={"fork_width": 0.25}).setup
     assert mine.bands["band1"].source == "rig"
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"setup": {"fork_width": 5.0}}, "settings: setup.fork_width: must be between 0.02 and 2"),
-        ({"setup": {"width": 0.3}}, "settings: setup.width: unknown key"),
-        ({"sling": {"edges": 7}}, "settings: sling: edges must be even"),
-        ({"stup": {}}, "settings: stup: unknown key"),
-    ],
-)
-def test_wrong_values_are_refused_by_name(changes: dict, message: str) -> None:
-    with pytest.raises(UserError, match=message):
-        Settings.default(**changes)

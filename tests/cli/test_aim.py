@@ -2,7 +2,6 @@
 
 import csv
 import json
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +17,6 @@ from sling2sim2real.cli.aim import of_aim
 from sling2sim2real.cli.plan.plan import plan_recording
 from tests.cli.lab import NAME
 from tests.policy.linear import write_policy
-from tests.project import python
 
 FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target along the base's x
 TIPS = np.array([[-0.1375, 0, 0], [0.1375, 0, 0]])
@@ -62,13 +60,6 @@ def test_band_hand_and_launch_lie_in_one_plane(place, turn, y, z) -> None:
     assert (pose["tcp_frame"], pose["hold_force_n"], list(pose)[-1]) == ("base", 9.0, "warnings")
     launch = np.array([0, np.cos(pose["pitch_rad"]), np.sin(pose["pitch_rad"])])
     np.testing.assert_allclose(axes[:, 2], to_base[:3, :3] @ launch, atol=1e-12)
-
-
-def test_a_half_turn_about_the_approach_axis_as_the_docs_say() -> None:
-    """(qy, -qx, qw, -qz) points ahead alike, with the other side up."""
-    x, y, z, w = at(-0.3, -0.2, FORK_IN_BASE)["tcp_quaternion_xyzw"]
-    axes, turned = (Rotation.from_quat(q).as_matrix() for q in ((x, y, z, w), (y, -x, w, -z)))
-    np.testing.assert_allclose(turned, axes * [-1, -1, 1], atol=1e-12)
 
 
 def test_the_plan_of_a_recording_holds_the_same_draw_alike(tmp_path) -> None:
@@ -157,11 +148,3 @@ def test_launch_prints_one_json_object(fitted, tmp_path, sling) -> None:
     broken = sling("launch", f"bands/{NAME}", "--draw=-0.45,-0.30", "--json", folder=fitted)
     if json.loads(broken.stdout)["failure"]:
         assert json.loads(broken.stdout)["landing_y_m"] is None
-
-
-@pytest.mark.slow
-def test_the_command_as_a_process(fitted, tmp_path) -> None:
-    shutil.copytree(fitted, tmp_path / "lab")
-    command = ("-m", "sling2sim2real", "aim", "bands/toy", "--target", "1.9", "--json")
-    done = python(*command, folder=tmp_path / "lab")
-    assert done.returncode == 0 and json.loads(done.stdout)["draw_y_m"] < 0, done.stderr

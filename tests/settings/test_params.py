@@ -69,11 +69,6 @@ def test_attributes_are_the_keys_of_the_file() -> None:
     compare(CONTENT, load(DEFAULTS))
 
 
-def test_the_view_cannot_be_changed() -> None:
-    with pytest.raises(ValueError, match="frozen"):
-        load(DEFAULTS).optimizer.k_top = 2
-
-
 def test_every_number_has_a_range_and_a_type() -> None:
     numbers = [(path, v) for path, v in leaves(CONTENT) if type(v) in (int, float)]
     assert len(numbers) > 200
@@ -116,11 +111,6 @@ def test_a_rigs_law_has_constants_of_its_own() -> None:
         message = refusal(changed(path, {**band, "constants": wrong}))
         expected = f"rig.bands.band1: constants: gent has [15 to 10000], got {wrong}"
         assert message == f"params.yaml: {expected}"
-
-
-def test_whole_numbers_refuse_fractions_and_numbers_accept_whole_ones() -> None:
-    assert "whole number between 1 and 50, got 2.5" in refusal(changed(("optimizer", "k_top"), 2.5))
-    assert checked(changed(("setup", "max_force"), 30)).setup.max_force == 30.0
 
 
 def test_exact_lines() -> None:

@@ -1,6 +1,6 @@
-"""Launches: ballistics in closed form, what shares them, failures by name.
+"""Launches: ballistics in closed form, failures by name.
 
-tests/validation/simulator/test_limits.py holds their steps, flight and energy.
+tests/validation/simulator/test_limits.py holds their steps and energy.
 """
 
 from dataclasses import replace

@@ -47,20 +47,13 @@ class Survey:
                 self.unconverged.append({k: v for k, v in sample.items() if k not in EXTRA})
 
 
-def corners(bench: Bench) -> Parameters:
-    """The 32 corners of the box, where each parameter is at a bound."""
-    unit = np.array(list(product((0.0, 1.0), repeat=len(THETA))))
+def on_boundary(bench: Bench, faces: int) -> Parameters:
+    """The 32 corners of the box, and `faces` random ones with one parameter at a bound."""
+    corners = np.array(list(product((0.0, 1.0), repeat=len(THETA))))
+    on_faces, turn = np.random.default_rng(SEED).random((faces, len(THETA))), np.arange(faces)
+    on_faces[turn, turn % len(THETA)] = turn // len(THETA) % 2
     box = SearchBox.of(bench.params.parameters)
-    return box.parameters(box.to_physical(unit))
-
-
-def on_faces(bench: Bench, count: int) -> Parameters:
-    """`count` random ones of the box, one parameter of each at a bound, every one in turn."""
-    unit = np.random.default_rng(SEED).random((count, len(THETA)))
-    turn = np.arange(count)
-    unit[turn, turn % len(THETA)] = turn // len(THETA) % 2
-    box = SearchBox.of(bench.params.parameters)
-    return box.parameters(box.to_physical(unit))
+    return box.parameters(box.to_physical(np.concatenate([corners, on_faces])))
 
 
 def survey(bench: Bench, sling: ClampedBand, parameters: Parameters) -> Survey:
@@ -105,13 +98,12 @@ def section(
 ) -> Theme:
     sling = band_of(bench)
     thetas = Parameters.of(sling.law, random_thetas(bench, count, SEED))
-    fast = replace(sling, grip_force=HELD_FAST)
+    fast, boundary = replace(sling, grip_force=HELD_FAST), on_boundary(bench, faces)
     within = f"{count} rollouts within the box, held fast"
     surveys = {
         within: survey(bench, fast, thetas),
-        "32 rollouts at the corners of the box, held fast": survey(bench, fast, corners(bench)),
-        f"{faces} rollouts on its faces, one parameter at a bound, held fast": survey(
-            bench, fast, on_faces(bench, faces)
+        f"{len(boundary)} rollouts at its corners and on its faces, held fast": survey(
+            bench, fast, boundary
         ),
         f"{launches} rollouts with the default grip": survey(bench, sling, thetas[:launches]),
         f"{launches} launches from random draws": survey_launches(bench, sling, thetas[:launches]),

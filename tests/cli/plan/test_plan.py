@@ -212,13 +212,6 @@ def test_what_is_printed(plan, tmp_path) -> None:
     assert pull["max_speed_m_s"] == pytest.approx(0.2, rel=1e-3)
 
 
-def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="cannot be written"):
-        plan.write(tmp_path / "file", 100.0)
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
 @pytest.mark.parametrize(
     ("section", "values", "expected"),
     [

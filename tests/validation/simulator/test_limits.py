@@ -13,7 +13,6 @@ from validation.simulator import (
     corotated,
     damping,
     energy,
-    free_motion,
     friction,
     launching,
     robustness,
@@ -40,10 +39,7 @@ CHECKS = {
         bench, band_of(bench), Parameters.of(NEO_HOOKEAN, agreement.random_thetas(bench, 4, 11))
     ),
     "a heavy middle": lambda bench: damping.oscillator(bench, OSCILLATORS),
-    "free fall": free_motion.free_fall,
-    "momentum": free_motion.momentum,
     "launches in finer steps": lambda bench: launching.convergence(bench, 6),
-    "order in time": lambda bench: launching.order_in_time(bench, count=6),
     "flight and energy": lambda bench: launching.physics(bench, count=4),
     "a string's volume": at_rest.volume,
     "friction": friction.friction,
@@ -55,7 +51,6 @@ CHECKS = {
         bench, 1, sling=rubber.rubber_of(bench), **rubber.law_parameters((-0.3, 0.2), 0.08)
     ),
     "rubber: growth of energy": lambda bench: rubber.growth(bench, 4),
-    "rubber: slack again": rubber.slack,
     "rubber: a launch's history": rubber.histories,
     "rubber: random points": lambda bench: rubber.survey(bench, 64),
     "rubber: energy": lambda bench: energy.checks(
@@ -102,7 +97,7 @@ def test_the_hands_work_is_accounted_for_and_losses_only_grow(bench):
 
 def test_random_thetas_are_finite_or_fail_by_name(bench):
     section = robustness.section(bench, count=64, launches=32, faces=20)
-    assert len(robustness.corners(bench)) == 32 and len(section.checks) == 2 * 5
+    assert len(section.checks) == 2 * 4
     assert_kept(section.checks)
 
 
@@ -127,7 +122,7 @@ def test_samples_are_as_many_as_asked_for_and_lie_where_they_should(bench):
     for count in (3, launching.COUNT + 5):
         theta, draws = launching.random_launches(count)
         assert theta.shape == (count, 5) and draws.shape == (count, 2)
-    thetas = robustness.on_faces(bench, 20)
+    thetas = robustness.on_boundary(bench, 20)[32:]
     for name in robustness.THETA:
         bounds = getattr(bench.params.parameters, name)
         at = np.isclose(thetas.column(name)[:, None], [bounds.low, bounds.high])

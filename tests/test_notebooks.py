@@ -31,7 +31,7 @@ def cells(name: str, kind: str) -> list[dict]:
 def test_it_is_small_has_pictures_and_installs_from_the_one_address(name: str) -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     code = cells(name, "code")
-    assert f"git+{project['urls']['Repository']}\n" in code[0]["source"]
+    assert code[0]["source"][0].endswith(f"git+{project['urls']['Repository']}\n")
     outputs = [output for cell in code for output in cell["outputs"]]
     assert any("image/png" in output.get("data", ()) for output in outputs)
     assert not any(output["output_type"] == "error" for output in outputs)

@@ -8,11 +8,14 @@ is made: functions of their docstrings, commands of their help, settings of para
 
 from __future__ import annotations
 
+import base64
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -41,6 +44,8 @@ def lay_out(folder: Path) -> None:
             shutil.copyfile(ROOT / name, folder / name)
     for file in (folder / "sling2sim2real").glob("*.py"):
         file.write_text(EXAMPLE.sub(_headed, file.read_text("utf-8")), encoding="utf-8")
+    for file in (folder / "docs" / "notebooks").glob("*.ipynb"):
+        file.with_suffix(".md").write_text(notebook(file), encoding="utf-8")
     names = "\n\n".join(f"::: sling2sim2real.{name}" for name in sling2sim2real.__all__)
     written = {
         "functions": f"# Python functions\n\n{names}\n",
@@ -49,6 +54,29 @@ def lay_out(folder: Path) -> None:
     }
     for name, text in written.items():
         (folder / "docs" / "reference" / f"{name}.md").write_text(text, encoding="utf-8")
+
+
+def notebook(path: Path) -> str:
+    """A notebook as a page; its pictures lie beside it."""
+    url = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["urls"][
+        "Repository"
+    ]
+    place = f"{url.removeprefix('https://github.com/')}/blob/main/docs/notebooks/{path.name}"
+    parts = []
+    for number, cell in enumerate(json.loads(path.read_text("utf-8"))["cells"]):
+        source = "".join(cell["source"])
+        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+        for output in cell.get("outputs", []):
+            data = output.get("data", {})
+            if "image/png" in data:
+                picture = path.with_name(f"{path.stem}-{number}.png")
+                picture.write_bytes(base64.b64decode(data["image/png"]))
+                parts.append(f"![output of the cell above]({picture.name})")
+            else:
+                text = "".join(output.get("text", data.get("text/plain", "")))
+                parts.append(f"```\n{text.rstrip()}\n```")
+    parts.insert(1, f"[Open in Colab](https://colab.research.google.com/github/{place})")
+    return "\n\n".join(parts) + "\n"
 
 
 def commands() -> str:

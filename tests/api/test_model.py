@@ -11,7 +11,6 @@ from sling2sim2real.api.model import with_band
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.identification.results.theta import load_theta
 from sling2sim2real.launching.surface.simulator import simulator
-from sling2sim2real.settings.identification import LAWS
 
 DRAWS = np.array([[-0.30, -0.15], [-0.35, -0.20]])
 EXTRA = {"air_drag": 0.5, "turn_damping": 0.2, "returned_share": 0.97}
@@ -56,7 +55,14 @@ def test_points_of_their_own(world) -> None:
     [
         {},
         {"law": "corotated"},
-        dict(zip(LAWS["rubber"], (0.2, 0.1, 0.2, 0.01, 0.1, 2.0), strict=True)),
+        {
+            "mooney_share": 0.2,
+            "upturn": 0.1,
+            "softening": 0.2,
+            "relaxation": 0.01,
+            "flow": 0.1,
+            "log_flow_rate": 2.0,
+        },
     ],
 )
 def test_theta_is_read_as_it_is_written(tmp_path, law) -> None:

@@ -69,7 +69,7 @@ def test_launches_are_learned_from_or_held_against(copied, no_recording_is_read)
     fit(BandFolder(TOY))
     checked = Identification.load(TOY)
     assert not checked.stale and checked.theta == before.theta
-    assert "- Landings held against predictions: 1 measured." in (
+    assert "- Launches that check the predictions: 1 measured." in (
         (TOY / "card/README.md").read_text()
     )
     (TOY / "launches.csv").write_text("draw_y,draw_z,landing\n-0.3,-0.15,2.0\n")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+import open3d
 import pytest
-from scipy.spatial import cKDTree
 
 from pipeline.params import load
 from sling2sim2real.base.errors import UserError
@@ -37,7 +37,7 @@ def test_strays_are_removed_and_the_band_is_covered() -> None:
 
 
 def test_the_papers_order_samples_first_and_so_keeps_more_strays() -> None:
-    """Both orders against NumPy and SciPy; strays are farthest, so that all of them are sampled."""
+    """Both orders against Open3D's filters and NumPy; strays are farthest, so all are sampled."""
     random = np.random.default_rng(0)
     strays = random.uniform([0, 0.05, 0.05], [0.4, 0.3, 0.3], (40, 3))
     points = np.concatenate([tube(4000, random), strays])
@@ -45,12 +45,12 @@ def test_the_papers_order_samples_first_and_so_keeps_more_strays() -> None:
     literal = settings.model_copy(update={"sampling": "before_filters"})
 
     def filtered(cloud: np.ndarray) -> np.ndarray:
-        tree = cKDTree(cloud)
-        mean = tree.query(cloud, settings.statistical_neighbors)[0].mean(axis=1)
-        limit = mean.mean() + settings.statistical_ratio * mean.std(ddof=1)
-        cloud = cloud[mean < limit]
-        near = cKDTree(cloud).query_ball_point(cloud, settings.radius, return_length=True)
-        return cloud[near > settings.radius_neighbors]  # itself is one of them
+        dense = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(cloud))
+        dense, _ = dense.remove_statistical_outlier(
+            settings.statistical_neighbors, settings.statistical_ratio
+        )
+        dense, _ = dense.remove_radius_outlier(settings.radius_neighbors, settings.radius)
+        return np.asarray(dense.points)
 
     def sampled(cloud: np.ndarray) -> np.ndarray:
         chosen, away = [0], np.full(len(cloud), np.inf)

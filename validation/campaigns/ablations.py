@@ -35,7 +35,7 @@ from sling2sim2real.settings.identification import MethodParams
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import aimed, recorded, sling_of
 from validation.campaigns.runner import PAPER
-from validation.campaigns.variants import LAST, rollouts_of_search, with_preset, with_variants
+from validation.campaigns.variants import rollouts_of_search, with_preset, with_variants
 from validation.density import calibrated_by
 from validation.paired import LEVEL, compared, mean_interval
 from validation.projects import with_section
@@ -60,7 +60,7 @@ class Job:
 def jobs_of(
     bands: Sequence[str], methods: Sequence[str], recordings: int, seeds: int, first: int = FIRST
 ) -> list[Job]:
-    """Every identification, those first that tell most and cost least."""
+    """Every identification, first one of each recording."""
     singles = [
         Job(band, first + number, method, 1)
         for number in range(recordings)
@@ -73,7 +73,7 @@ def jobs_of(
         for method in methods
         for band in bands
     ]
-    return sorted(singles + spread, key=lambda job: job.method == LAST)
+    return singles + spread
 
 
 def recordings_of(jobs: Sequence[Job]) -> list[tuple[str, int]]:

@@ -1,4 +1,4 @@
-"""Variants of the paper's method for the ablations: one thing plain or left out."""
+"""Variants of the paper's method for the ablations, and budgets of presets."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 from validation.campaigns.runner import PAPER
 
 PRESETS = ROOT / "presets"
-LAST = "plain_bo"  # takes as long as all others
 # Gaussian processes of thousands of points cost more than the simulations: a large budget is less.
 BAYES, BAYES_LARGE = (
     ("bo", "package_si"),
@@ -21,22 +20,9 @@ BAYES, BAYES_LARGE = (
 
 
 def with_variants(params: Params) -> Params:
-    """params.yaml's methods, and the paper's with one thing plain or left out."""
-    paper, optimizer = params.methods[PAPER], params.optimizer
-    names = ("generations", "delta", "cma_population", "recombination")
-    starts = {name: getattr(optimizer, name) for name in names}
-    low, high = optimizer.mutation
-    starts |= {"mutation_low": low, "mutation_high": high}
-
-    def variant(kind: str, **settings):
-        search = f"validation.searches:{kind}"
-        return paper.model_copy(update={"search": search, "settings": settings})
-
+    """params.yaml's methods, and the paper's without clamp calibration or with another law."""
+    paper = params.methods[PAPER]
     methods = dict(params.methods.items()) | {
-        "no_covariance_plain": variant("plain_starts", k_top=optimizer.k_top, **starts),
-        "no_covariance_no_multistart_plain": variant("plain_starts", k_top=1, **starts),
-        LAST: variant("small_batches"),
-        "plain_adam": variant("plain_adam"),
         "no_clamp_calibration": paper.model_copy(update={"mounting": False}),
         NEO_HOOKEAN: paper.model_copy(update={"law": NEO_HOOKEAN}),
     }

@@ -195,6 +195,35 @@ def growth(bench: Bench, count: int = 16) -> list[Measure]:
     return damping.growth(bench, rubber_of(bench), points, FORMULAS, **TIGHT)
 
 
+def slack(bench: Bench) -> list[Measure]:
+    """A band that relaxed while drawn and is led back to its rest length pushes the hand no more.
+
+    It is longer than it was; it bends out and grows short again.
+    """
+    sling = rubber_of(bench)
+    theta = Parameters.of(RUBBER, [3e5, 0.45, 1e-3, 0.5, 0.5], **law_parameters(relaxation=0.1))
+    sling = straight(sling, sling.rest_length)
+    out, back = np.linspace(0.01, 1, 100), 30 + np.linspace(0.005, 0.5, 100)
+    later = np.linspace(1.1, 30, 40), 30.5 + np.linspace(0.05, 60, 200)
+    times = np.concatenate([[0], out, later[0], back, later[1]])
+    depth = 0.3 * np.interp(times, [0, 1, 30, 30.5, 91], [0, 1, 1, 0, 0])
+    table = steps(times, 0.01, grip=Grip.POUCH)
+    table["target"][:, 1] = -depth[1:]
+    motion = move(bench, sling, theta, table, straight_guess(sling), double=True)
+    force = np.linalg.norm(motion.force[0], axis=1)
+    weight = sling.mass * 9.81
+    return [
+        Measure(
+            "force on the hand a minute after a drawn band was led back, over the band's weight",
+            "at most its weight: nothing is stretched",
+            float(force[-1] / weight) if not motion.failed[0] else float("nan"),
+            "weights",
+            1.0,
+            f"{force[: len(table)].max():.1f} N at its most",
+        )
+    ]
+
+
 def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Measure]:
     """`launch` starts with what a pull and a pause leave in the memory: the march of that pull."""
     sling, draw = rubber_of(bench), np.array([-0.35, -0.15])
@@ -255,6 +284,7 @@ def section(bench: Bench) -> Theme:
             *agreement.checks(bench, 2, sling=sling, **law_parameters()),
             *energy.checks(balance),
             *growth(bench),
+            *slack(bench),
             *histories(bench),
             *launching.convergence(bench, sling=sling, history=HISTORY, **law_parameters()),
             *survey(bench),

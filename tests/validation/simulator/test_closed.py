@@ -6,6 +6,7 @@ from scipy.optimize import brentq
 
 from validation.simulator.closed import String
 from validation.simulator.experiment import band_of
+from validation.simulator.free_motion import GRAVITY, fall_of_a_point
 
 
 def test_closed_form_has_no_stress_across(bench):
@@ -35,3 +36,13 @@ def test_tangents_are_the_slope_of_the_pull(bench):
     assert k == pytest.approx(4 * slope / string.sling.rest_length, rel=1e-6)
     assert c == pytest.approx(string.damping * k, rel=1e-9)  # s = 1: d times the stiffness
     assert np.isclose(string.force(1.0), 0.0)
+
+
+def test_formulas_fall_as_galileo_says():
+    """First order at the first order, second order at the second."""
+    for order in (1, 2):
+        errors = []
+        for count in (50, 100):
+            times = np.linspace(0, 1, count + 1)
+            errors.append(abs(fall_of_a_point(times, order)[-1] + GRAVITY / 2))
+        assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)

@@ -1,5 +1,7 @@
 """The checks of `sling verify` keep their limits, at smaller sizes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from validation.simulator import (
     corotated,
     damping,
     energy,
+    free_motion,
     friction,
     launching,
     robustness,
@@ -37,7 +40,10 @@ CHECKS = {
         bench, band_of(bench), Parameters.of(NEO_HOOKEAN, agreement.random_thetas(bench, 4, 11))
     ),
     "a heavy middle": lambda bench: damping.oscillator(bench, OSCILLATORS),
+    "free fall": free_motion.free_fall,
+    "momentum": free_motion.momentum,
     "launches in finer steps": lambda bench: launching.convergence(bench, 6),
+    "order in time": lambda bench: launching.order_in_time(bench, count=6),
     "flight and energy": lambda bench: launching.physics(bench, count=4),
     "a string's volume": at_rest.volume,
     "friction": friction.friction,
@@ -49,6 +55,7 @@ CHECKS = {
         bench, 1, sling=rubber.rubber_of(bench), **rubber.law_parameters((-0.3, 0.2), 0.08)
     ),
     "rubber: growth of energy": lambda bench: rubber.growth(bench, 4),
+    "rubber: slack again": rubber.slack,
     "rubber: a launch's history": rubber.histories,
     "rubber: random points": lambda bench: rubber.survey(bench, 64),
     "rubber: energy": lambda bench: energy.checks(
@@ -102,3 +109,15 @@ def test_random_thetas_are_finite_or_fail_by_name(bench):
 def test_launches_of_random_rubber_are_finite_or_fail_by_name(bench):
     points = rubber.random_points(bench, 64)
     assert not robustness.survey_launches(bench, rubber.rubber_of(bench), points).not_finite
+
+
+def test_what_is_not_finite_and_not_marked_is_counted(bench, monkeypatch):
+    true = robustness.interact
+
+    def broken(*args, **options):
+        done = true(*args, **options)
+        return replace(done, force=np.nan * done.force, failure=[None] * len(done.failure))
+
+    monkeypatch.setattr(robustness, "interact", broken)
+    points = rubber.random_points(bench, 4)
+    assert robustness.survey(bench, rubber.rubber_of(bench), points).not_finite == 4

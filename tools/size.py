@@ -19,16 +19,16 @@ from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-BUDGETS = {  # what was reached on 2026-11-28, plus 2 %; the whole too
-    "pipeline": 2_310,
-    "sling2sim2real": 21_060,
-    "stages": 490,
+BUDGETS = {  # what was reached on 2026-11-28, plus 2 %; the whole plus 1 %
+    "pipeline": 2_030,
+    "sling2sim2real": 20_780,
+    "stages": 460,
     "rig": 1_950,
-    "validation": 6_480,
-    "tests": 19_950,
-    "tools": 570,
+    "validation": 6_300,
+    "tests": 19_020,
+    "tools": 440,
     "examples": 530,
-    "all": 53_290,
+    "all": 51_000,
 }
 COMMENTS = {  # by suffix: what is no code
     ".h": re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL),

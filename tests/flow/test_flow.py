@@ -89,7 +89,8 @@ def test_after_a_kill_the_next_flow_does_what_is_stale_and_no_more(tmp_path: Pat
     stages = {
         "done": stage("echo 1 >> runs; echo 1 > done.txt", "done.txt"),
         "long": stage(
-            "while [ -e pause ]; do sleep 0.1; done; echo 1 >> runs; cp done.txt long.txt",
+            "touch begun; while [ -e pause ]; do sleep 0.1; done; echo 1 >> runs;"
+            " cp done.txt long.txt",
             "long.txt",
             "done.txt",
         ),
@@ -97,12 +98,13 @@ def test_after_a_kill_the_next_flow_does_what_is_stale_and_no_more(tmp_path: Pat
     toy = Toy(tmp_path, stages)
     (tmp_path / "pause").touch()
     flow = toy.start("sling", "flow")
-    assert flow.stdout
-    wait_until(lambda: "long | Running" in flow.stdout.readline())
+    wait_until((tmp_path / "begun").exists)
     toy.end(flow, signal.SIGKILL)
     assert "is busy" in toy.flow()[1][-1]
     (tmp_path / "pause").unlink()
-    wait_until(lambda: not any("dvc" in process.name() for process in toy.processes()))
+    wait_until(
+        lambda: not any("dvc.cli" in " ".join(process.cmdline()) for process in toy.processes())
+    )
     status, lines = toy.flow()
     assert status == 0 and lines[-1].startswith("stages: 1 Completed ("), lines
     assert toy.read("runs") == "1\n1" and toy.read("long.txt") == "1"

@@ -98,6 +98,6 @@ def test_a_robot_that_pulls_twice_makes_two_recordings_in_one_file(recorded, tmp
     assert all(pull["usable"] for pull in pulls), str(pulls)
     assert [pull["release_s"] for pull in pulls] == pytest.approx(releases, abs=1e-3)
     assert [pull["grasp_s"] for pull in pulls] == pytest.approx(grasps, abs=0.021)
-    assert "pause" not in {caution["about"] for caution in report["cautions"]}
+    assert not any("the pull before" in caution["what"] for caution in report["cautions"])
     with pytest.raises(UserError, match="--pulls: at most 10 in one recording, got 11"):
         plan_recording(recorded[2], BAND, pulls=11)

@@ -10,11 +10,7 @@ import psutil
 from ruamel.yaml import YAML
 
 from pipeline.layout import ROOT
-from validation import projects
-from validation.projects import environment, run_of, wait
-
-# What tests are written for, whatever params.yaml has. conftest.py imports this before all else.
-DEFAULTS = projects.DEFAULTS = Path(__file__).with_name("params.yaml")
+from validation.projects import DEFAULTS, environment, run_of, wait
 
 # What params.yaml has of a band of one's own.
 BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}

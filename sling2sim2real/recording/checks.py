@@ -514,8 +514,9 @@ def _of_force(pull: Pull, signals: Signals, start: float, most: float) -> Iterat
     change = 0.0 if facts.zero_change is None else float(np.linalg.norm(facts.zero_change))
     unsure = ZERO_SURE * facts.zero_error
     if not facts.zero_steady and change > ZERO_OFF * hold:
-        what = f"the force's zero is {change:.2f} N off after the release, and did not get there"
-        what += f" steadily: the held force is unsure by up to {100 * change / hold:.0f} %"
+        what = f"the force's zero is {change:.2f} N off after the release, and the free hand"
+        what += " shows no steady drift to there: the held force is unsure by up to"
+        what += f" {100 * change / hold:.0f} %"
         yield found("zero", what, refused=change > ZERO_FAR * hold)
     elif unsure > ZERO_UNSURE * hold:
         what = f"the free hand's force is known to {unsure:.2f} N only, which is"

@@ -142,8 +142,8 @@ TABLE = (
     Check("delay",
         "the stamps of pose and camera with the force's, by what the recording shows",
         "the estimates' standard errors; what nothing shows the fit leaves open",
-        f"{1e3 * SMALL:g} ms and {SURE:g} standard errors, taken out where confirmed; the pose's is not"
-        f" known to {1e3 * OPEN:g} ms; or two estimates disagree",
+        f"{1e3 * SMALL:g} ms and {SURE:g} standard errors, taken out where confirmed; the pose's is"
+        f" not known to {1e3 * OPEN:g} ms; or two estimates disagree",
         "",
         "record the force from the robot's own clock, or set episode.delays in params.yaml"),
     Check("release_pictures",

@@ -59,8 +59,8 @@ class Estimate:
         left: Standard deviation of what the stamps may still be late [s].
         against: What the estimate is against: "force"; "release", as the force shows it; or "pose".
         given: What was given of it [s]; None where nothing was.
-        alone: Only the hand that starts back tells it, as a motion of the robot's own would, so that
-            it is not applied.
+        alone: Only the hand that starts back tells it, as a motion of the robot's own would: it is
+            not applied.
     """
 
     value: float = 0.0

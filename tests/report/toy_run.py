@@ -125,6 +125,11 @@ def theta(band: str, method: str) -> dict:
     return content | {"loss": loss, "theta": THETA | {"damping_scale": 0.999}}
 
 
+def _launch(draw: list[float], landing: float, left: float | None, z: float | None) -> dict:
+    values = {"measured": landing, "left": left, "z_without_it": z}
+    return {"draw": draw} | {name: {"landing": value} for name, value in values.items()}
+
+
 def _confidence(band: str) -> dict:
     """Of band1 with all that there is, of band2 in doubt, of BAND as simple as can be."""
     known = confidence()
@@ -141,7 +146,7 @@ def _confidence(band: str) -> dict:
     second = known["recordings"][0] | {"source": {"file": "a|b`c*.mcap", "pull": 2}}
     second |= {"pictures": [0.0123, 0.0456], "misfit_without": 3.21}
     evidence = [
-        {"draw": [-0.3, -0.15], "landing": 1.9, "left": 0.021, "z_without_it": 0.5},
-        {"draw": [-0.3, -0.16], "landing": 2.0, "left": None, "z_without_it": None},
+        _launch([-0.3, -0.15], 1.9, 0.021, 0.5),
+        _launch([-0.3, -0.16], 2.0, None, None),
     ]
     return known | {"recordings": [*known["recordings"], second], "launches": evidence}

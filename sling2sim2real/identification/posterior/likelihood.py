@@ -102,6 +102,7 @@ class Likelihood:
         episode, cutoff: As given.
         sling: As given, with the pads' opening time of this episode.
         tolerances: By the episode's metadata, until `with_wider_tolerances`.
+        share: How much its residuals count, of one (sharing.py).
         camera_shift: What was added to the camera's stamps before the fit [s].
     """
 
@@ -111,7 +112,7 @@ class Likelihood:
         """`friction` is what the method fixes, of the pads."""
         self.episode, self.cutoff = episode, cutoff
         self.sling = with_recorded_pads(sling, episode, friction)
-        self.tolerances, self.camera_shift = Tolerances.of(episode), 0.0
+        self.tolerances, self.camera_shift, self.share = Tolerances.of(episode), 0.0, 1.0
         end = np.searchsorted(episode.time, episode.release_time)
         place = episode.position[max(end - 5, 0) : end].mean(axis=0)
         self._along_pull = place / np.linalg.norm(place)
@@ -132,6 +133,12 @@ class Likelihood:
         aligned.episode = replace(self.episode, cloud_time=self.episode.cloud_time + best)
         aligned._picture_count = _picture_count(aligned.episode)
         return aligned
+
+    def counting(self, share: float) -> Likelihood:
+        """Copy whose residuals count with a share."""
+        shared = copy(self)
+        shared.share = share
+        return shared
 
     def with_wider_tolerances(self, expansion: Expansion) -> Likelihood:
         """Copy with force and recoil as sure as the law can follow them.
@@ -268,5 +275,5 @@ class Likelihood:
         columns = [sizes[re.sub("_[xyz]$", "", name)] * change for name, change in changes.items()]
         for picture in np.unique(residuals.picture[residuals.recoils]):
             columns.append(has.jitter * np.where(residuals.of_picture(picture), camera, 0.0))
-        weight = 1 / residuals.spread(has.force, has.cloud, has.recoil)
+        weight = np.sqrt(self.share) / residuals.spread(has.force, has.cloud, has.recoil)
         return Form.of(residuals, weight, np.array(columns))

@@ -46,7 +46,7 @@ class Case:
 
     def expanded(self):
         recording = object.__new__(Likelihood)
-        recording.tolerances, recording.camera_shift = self.tolerances, 0.0
+        recording.tolerances, recording.camera_shift, recording.share = self.tolerances, 0.0, 1.0
         camera = self.nuisance_slopes[1]
         form = recording._form(self.residuals, self.gap, camera)
         parts = self.gap, self.slopes, self.nuisance_slopes, 0 * self.gap

@@ -99,7 +99,7 @@ def test_landing_speed_and_angle_share_the_error_of_the_draw(measured) -> None:
 
 
 def test_a_speed_is_held_against_all_other_launches_and_not_against_its_own_landing() -> None:
-    launched = Observed((-0.5, -0.2), 0.001, 0.33, 2.3)
+    launched = Observed((-0.5, -0.2), 0.001, 0.33, 2.05)
     alone, both = expanded(launched), expanded(launched, Observed((-0.6, -0.1), 0.0, 0.4))
     prior = np.diag([40.0, 250.0])
     assert list(both.launch) == [0, 0, 1]

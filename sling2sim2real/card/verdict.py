@@ -344,8 +344,8 @@ def _tried(findings: Findings):
     ):
         yield Reason(
             False,
-            f"The measurements of {findings.surprising} of {launches_of(findings.observed)} used for"
-            f" the fit lie outside the {_LEVEL} interval that all other data give.",
+            f"The measurements of {findings.surprising} of {launches_of(findings.observed)} used"
+            f" for the fit lie outside the {_LEVEL} interval that all other data give.",
             "Measure that launch again, and another one at the same draw: a wrong draw or landing"
             " shifts all predictions.",
         )

@@ -61,7 +61,9 @@ def test_a_poor_recording_beside_a_good_one_makes_nothing_worse(band, settings, 
     """One with dips; and one by the paper's pull without pictures of the recoil."""
     arrays = rehearse(world, seed=1)
     after = arrays["cloud_time"] > arrays["release_time"]
-    clouds = [cloud[: 0 if late else None] for cloud, late in zip(arrays["clouds"], after, strict=True)]
+    clouds = [
+        cloud[: 0 if late else None] for cloud, late in zip(arrays["clouds"], after, strict=True)
+    ]
     poor = episode_from_arrays(**arrays | {"clouds": clouds})
     good = episode_from_arrays(**rehearse(world, dips=True, seed=2))
     found = [

@@ -10,7 +10,7 @@ import pandas as pd
 from pipeline.layout import Layout
 from pipeline.params import Params, load
 from pipeline.params.run import RunParams
-from sling2sim2real.base.launches_file import COLUMNS, MORE
+from sling2sim2real.base.launches_file import AIMED, COLUMNS
 from sling2sim2real.identification.searches.regions import Region, save_regions
 from sling2sim2real.settings.identification import LAWS
 from sling2sim2real.simulator.parameters import THETA as NAMES
@@ -99,7 +99,7 @@ def write_run(root: Path) -> None:
     card = json.loads(file.read_text())
     card["training"] |= {"converged": False, "failed_targets": 2}
     file.write_text(json.dumps(card))
-    text = f"{','.join((*COLUMNS, *MORE))}\n-0.3,-0.2,,1.9,check,1.9,bo\n"
+    text = f"{','.join((*COLUMNS, *AIMED))}\n-0.3,-0.2,,1.9,check,1.9,bo\n"
     layout.launches(BAND).write_text(text)
     launches([[0.01, -0.01]] * 3).to_parquet(layout.trials(pairs[f"{DIPS}-{OURS}"]))
     layout.floor("band1").parent.mkdir()

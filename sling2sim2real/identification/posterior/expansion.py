@@ -76,21 +76,19 @@ class Form:
     Attributes:
         residuals: In their bins, R of them.
         weight: One over the spread of each, shape (R,).
-        linear: Columns of the M linear nuisances, each in units of its tolerance, shape (M, R).
-        basis: Orthonormal, of what these do to the residuals and to their own priors, shape
-            (R + M, M).
+        basis: Orthonormal, of what the M linear nuisances do to the residuals and to their own
+            priors, shape (R + M, M).
     """
 
     residuals: Residuals
     weight: np.ndarray
-    linear: np.ndarray
     basis: np.ndarray
 
     @classmethod
     def of(cls, residuals: Residuals, weight: np.ndarray, linear: np.ndarray) -> Form:
-        """Make it of the nuisances' columns."""
+        """Make it of the nuisances' columns (M, R), each in units of its tolerance."""
         effects = np.vstack([(linear * weight).T, np.eye(len(linear))])
-        return cls(residuals, weight, linear, np.linalg.qr(effects)[0])
+        return cls(residuals, weight, np.linalg.qr(effects)[0])
 
     def whitened(self, vectors: np.ndarray) -> np.ndarray:
         """Residuals (N, R) without what linear nuisances explain, shape (N, R + M).
@@ -110,13 +108,10 @@ class Expansion(Linearised):
 
     Attributes:
         form: Of the density.
-        products: Of all columns with each other, those of the D coordinates first and then those
-            of all nuisances in units of their tolerances: none of these is eliminated.
         origin: The logarithm of the loss factor there.
     """
 
     form: Form
-    products: np.ndarray
     origin: float
 
     @classmethod
@@ -138,30 +133,14 @@ class Expansion(Linearised):
             none = np.zeros((len(vectors), len(prior_slopes)))
             return np.hstack([form.whitened(vectors), none if priors is None else priors]).T
 
-        columns = [slopes, form.linear, nuisance_slopes / prior_slopes[:, None]]
-        columns = np.vstack(columns) * form.weight
         return cls(
             rows(here[None], priors[None])[:, 0],
             rows(slopes),
             rows(nuisance_slopes, np.diag(prior_slopes)),
             rows(uncounted[None])[:, 0],
             form,
-            columns @ columns.T,
             origin,
         )
-
-    def told(self, times: float) -> np.ndarray:
-        """`hessian` where residuals count so many times, and the nuisances' priors once."""
-        count = self.slopes.shape[1]
-        own, by, among = (
-            times * self.products[rows, columns]
-            for rows, columns in (
-                (slice(count), slice(count)),
-                (slice(count, None), slice(count)),
-                (slice(count, None), slice(count, None)),
-            )
-        )
-        return own - by.T @ np.linalg.solve(among + np.eye(len(among)), by)
 
     @property
     def _residuals(self) -> np.ndarray:

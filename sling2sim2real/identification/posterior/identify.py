@@ -23,7 +23,6 @@ from sling2sim2real.identification.posterior.launches import Evidence, LaunchLik
 from sling2sim2real.identification.posterior.likelihood import SIMULATED, Failed, Likelihood
 from sling2sim2real.identification.posterior.residuals import BINS, LEAST_POINTS
 from sling2sim2real.identification.posterior.sampling import SAMPLES, Remaining, samples_of
-from sling2sim2real.identification.posterior.sharing import shares
 from sling2sim2real.identification.results.ranges import at_edges
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.identification import parameter_names
@@ -125,18 +124,18 @@ def fit_posterior(
         recordings = [recording.aligned(nearest) for recording in recordings]
     except Failed:
         pass  # the fit says why
-    recordings = [recording.counting(1 / len(recordings)) for recording in recordings]
+    alike = sum(recording.shows_recoil for recording in recordings)
+    recordings = [recording.among(max(alike, 1)) for recording in recordings]
     fitted = fit(recordings, coordinates, begin, **options)
-    counted = shares(fitted.expansions, coordinates.precision)
     follows = [
-        recording.with_wider_tolerances(it).counting(share)
-        for recording, it, share in zip(recordings, fitted.expansions, counted, strict=True)
+        recording.with_wider_tolerances(it)
+        for recording, it in zip(recordings, fitted.expansions, strict=True)
     ]
     if any(
         getattr(wide.tolerances, what) > WORTH_WIDENING * getattr(recording.tolerances, what)
         for recording, wide in zip(recordings, follows, strict=True)
         for what in ("force", "recoil")
-    ) or np.any(np.abs(np.log(counted * len(counted))) > 2 * np.log(WORTH_WIDENING)):
+    ):
         recordings, first = follows, fitted
         fitted = fit(recordings, coordinates, first.phi, **options)
         fitted = replace(fitted, steps=first.steps + fitted.steps)

@@ -46,12 +46,7 @@ class Curve:
         if self.fails(phi):
             raise Failed("it broke")
         left, design = (curve(phi) - self.seen) / self.sigma, slopes(phi) / self.sigma
-        form = form or SimpleNamespace(
-            number=len(self.retained),
-            whitened=lambda x: x,
-            weight=1.0,
-            linear=np.zeros((0, len(left))),
-        )
+        form = form or SimpleNamespace(number=len(self.retained), whitened=lambda x: x)
         parts = left, design, np.zeros((3, len(left))), np.zeros(len(left))
         return Expansion.of(form, *parts, np.zeros(3), np.ones(3), origin=0.0)
 

@@ -52,7 +52,7 @@ def test_a_speed_is_evidence_beside_the_landing_or_alone(copied, no_recording_is
     assert after["returned_share"] < before["returned_share"]
     (entry,) = Identification.load(TOY).confidence["launches"]
     assert entry["measured"] == {"speed": 3.3, "angle": pytest.approx(np.deg2rad(40.0))}
-    assert entry["left"]["speed"] < 0 and entry["z_without_it"]["speed"] < 0
+    assert abs(entry["left"]["speed"]) < 0.02 and entry["z_without_it"]["speed"] < 0
     assert shown(done).endswith("measured  3.30 m/s, 40.0 degrees")
     assert read_launches(TOY / "launches.csv") == [fast]
 

@@ -37,6 +37,7 @@ class Case:
         self.gap = rng.normal(0, 0.1, size)
         self.slopes = rng.normal(0, 1, (PHI, size))
         self.nuisance_slopes = rng.normal(0, 50, (INNER, size))
+        self.slow_loss = np.where(np.arange(size) < 3 * FORCES, rng.normal(0, 1, size), 0.0)
         self.nuisances = np.array([1e-4, -3e-4, 4e-6])
 
     def spread(self, force, cloud, recoil) -> np.ndarray:
@@ -48,7 +49,7 @@ class Case:
         recording = object.__new__(Likelihood)
         recording.tolerances, recording.camera_shift = self.tolerances, 0.0
         camera = self.nuisance_slopes[1]
-        form = recording._form(self.residuals, self.gap, camera)
+        form = recording._form(self.residuals, self.gap, camera, self.slow_loss)
         parts = self.gap, self.slopes, self.nuisance_slopes, 0 * self.gap
         priors = recording._priors(self.nuisances), 1 / self.tolerances.simulated
         return Expansion.of(form, *parts, *priors, origin=0.0)
@@ -68,6 +69,7 @@ class Case:
             if name != "force_delay"
         ]
         linear.append(has.pose * self.columns["force_delay"])
+        linear.append(has.slow_loss * self.slow_loss)
         linear += [
             has.jitter * np.where(self.residuals.of_picture(picture), self.nuisance_slopes[1], 0)
             for picture in (8, 9)
@@ -144,7 +146,7 @@ def test_elimination_leaves_of_any_residuals_what_least_squares_does(case):
         assert left @ left == pytest.approx(np.sum((goal - rows[:, PHI:] @ best) ** 2), rel=1e-9)
 
 
-NAMED = "force cloud recoil release camera hand jitter shift turn bias drift pose".split()
+NAMED = "force cloud recoil release camera hand jitter shift turn bias drift pose slow_loss".split()
 
 
 @pytest.mark.parametrize("name", NAMED)

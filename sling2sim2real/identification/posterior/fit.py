@@ -77,7 +77,7 @@ class Fit:
 
     def misfit_of(self, other: Fit) -> float:
         """Another point's in the form that the density has here."""
-        moved = np.expm1(other.phi[LOSS] - self.phi[LOSS]) * self.evidence.uncounted
+        moved = (other.phi[LOSS] - self.phi[LOSS]) * self.evidence.uncounted
         residual = other.evidence.residual - moved
         return float(residual @ residual)
 

@@ -50,8 +50,6 @@ class Tolerances:
         bias, drift: Of the tared force, and over the pull [N].
         gain: Of the force sensor: datasheets have 1 to 1.5 % of full scale in 95 of 100 cases.
         pose: Of the pose's clock against the force's [s].
-        slow_loss: Of the loss factor that the force of the slow pull has, as a share of the
-            recoil's: rubber loses less, or more, at 1 Hz than at 50.
     """
 
     force: float = 0.11
@@ -67,7 +65,6 @@ class Tolerances:
     drift: float = 0.02
     gain: float = 6e-3
     pose: float = 5e-4
-    slow_loss: float = 1.0
 
     @classmethod
     def of(cls, episode: Episode) -> Tolerances:
@@ -105,6 +102,8 @@ class Likelihood:
         episode, cutoff: As given.
         sling: As given, with the pads' opening time of this episode.
         tolerances: By the episode's metadata, until `with_wider_tolerances`.
+        alike: How many recordings show a recoil. What the law gets wrong of it is in all of them,
+            so that together they may not tell more of it than one: each counts as one of so many.
         camera_shift: What was added to the camera's stamps before the fit [s].
     """
 
@@ -114,7 +113,7 @@ class Likelihood:
         """`friction` is what the method fixes, of the pads."""
         self.episode, self.cutoff = episode, cutoff
         self.sling = with_recorded_pads(sling, episode, friction)
-        self.tolerances, self.camera_shift = Tolerances.of(episode), 0.0
+        self.tolerances, self.camera_shift, self.alike = Tolerances.of(episode), 0.0, 1
         end = np.searchsorted(episode.time, episode.release_time)
         place = episode.position[max(end - 5, 0) : end].mean(axis=0)
         self._along_pull = place / np.linalg.norm(place)
@@ -135,6 +134,18 @@ class Likelihood:
         aligned.episode = replace(self.episode, cloud_time=self.episode.cloud_time + best)
         aligned._picture_count = _picture_count(aligned.episode)
         return aligned
+
+    @property
+    def shows_recoil(self) -> bool:
+        """Whether any picture of the recoil counts."""
+        pictures = Rule().pictures(self.episode)
+        return bool((self.episode.cloud_time[pictures] > self.episode.release_time).any())
+
+    def among(self, alike: int) -> Likelihood:
+        """Copy that is one of so many that show a recoil."""
+        one = copy(self)
+        one.alike = alike
+        return one
 
     def with_wider_tolerances(self, expansion: Expansion) -> Likelihood:
         """Copy with force and recoil as sure as the law can follow them.
@@ -210,13 +221,12 @@ class Likelihood:
         moved = np.concatenate([residuals(rollouts) for rollouts in (released, later, led)])
         slopes = (np.array(others) - here) / steps[:, None]
         nuisance_slopes = (moved - here) / NUISANCE_STEPS[:, None]
+        form = form or self._form(residuals, here, nuisance_slopes[SIMULATED.index("camera")])
         # The force tells nothing of the loss factor, the recoil does: a law that lacks slow
         # hysteresis would take the one for the other.
         uncounted = slopes[LOSS].copy()
         uncounted[3 * len(residuals.samples) :] = 0.0
         slopes[LOSS] -= uncounted
-        camera = nuisance_slopes[SIMULATED.index("camera")]
-        form = form or self._form(residuals, here, camera, uncounted)
         parts = here, slopes, nuisance_slopes, uncounted
         prior = self._priors(nuisances), 1 / self.tolerances.simulated
         return Expansion.of(form, *parts, *prior, origin=float(phi[LOSS]))
@@ -246,7 +256,7 @@ class Likelihood:
         rollouts = interact(self.sling, seen, parameters, until=until, workers=workers)
         residuals = expansion.form.whitened(expansion.form.residuals(rollouts))
         priors = np.tile(self._priors(nuisances), (len(residuals), 1))
-        moved = np.outer(np.expm1(loss - expansion.origin), expansion.uncounted)
+        moved = np.outer(loss - expansion.origin, expansion.uncounted)
         remaining = expansion.cleared(np.hstack([residuals, priors]) - moved)
         remaining[[why is not None for why in rollouts.failure]] = np.nan
         return remaining
@@ -263,22 +273,14 @@ class Likelihood:
     def _binned(self, rollouts: Rollouts) -> Residuals:
         return Residuals(self.episode, self.sling, self.cutoff, rollouts.center_line[0])
 
-    def _form(
-        self, residuals: Residuals, here: np.ndarray, camera: np.ndarray, slow_loss: np.ndarray
-    ) -> Form:
-        """The density's form by residuals (R,), and what changes them, (R,) each.
-
-        Args:
-            camera: The camera's clock.
-            slow_loss: The loss factor that the force has, all of it.
-        """
+    def _form(self, residuals: Residuals, here: np.ndarray, camera: np.ndarray) -> Form:
+        """The density's form by residuals (R,) and how the camera's clock changes them, (R,)."""
         has, changes = self.tolerances, residuals.columns(here)
         sizes = {"force_bias": has.bias, "force_drift": has.drift}
         sizes |= {"force_gain": has.gain, "force_delay": has.pose}
         sizes |= {"cloud_shift": has.shift, "cloud_turn": has.turn}
         columns = [sizes[re.sub("_[xyz]$", "", name)] * change for name, change in changes.items()]
-        columns.append(has.slow_loss * slow_loss)
         for picture in np.unique(residuals.picture[residuals.recoils]):
             columns.append(has.jitter * np.where(residuals.of_picture(picture), camera, 0.0))
-        weight = 1 / residuals.spread(has.force, has.cloud, has.recoil)
+        weight = 1 / residuals.spread(has.force, has.cloud, np.sqrt(self.alike) * has.recoil)
         return Form.of(residuals, weight, np.array(columns))

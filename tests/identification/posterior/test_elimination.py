@@ -37,7 +37,6 @@ class Case:
         self.gap = rng.normal(0, 0.1, size)
         self.slopes = rng.normal(0, 1, (PHI, size))
         self.nuisance_slopes = rng.normal(0, 50, (INNER, size))
-        self.slow_loss = np.where(np.arange(size) < 3 * FORCES, rng.normal(0, 1, size), 0.0)
         self.nuisances = np.array([1e-4, -3e-4, 4e-6])
 
     def spread(self, force, cloud, recoil) -> np.ndarray:
@@ -45,11 +44,12 @@ class Case:
             [np.full(3 * FORCES, force), np.full(2 * BINS, np.hypot(cloud, recoil))]
         )
 
-    def expanded(self):
+    def expanded(self, alike: int = 1):
         recording = object.__new__(Likelihood)
         recording.tolerances, recording.camera_shift = self.tolerances, 0.0
+        recording.alike = alike
         camera = self.nuisance_slopes[1]
-        form = recording._form(self.residuals, self.gap, camera, self.slow_loss)
+        form = recording._form(self.residuals, self.gap, camera)
         parts = self.gap, self.slopes, self.nuisance_slopes, 0 * self.gap
         priors = recording._priors(self.nuisances), 1 / self.tolerances.simulated
         return Expansion.of(form, *parts, *priors, origin=0.0)
@@ -69,7 +69,6 @@ class Case:
             if name != "force_delay"
         ]
         linear.append(has.pose * self.columns["force_delay"])
-        linear.append(has.slow_loss * self.slow_loss)
         linear += [
             has.jitter * np.where(self.residuals.of_picture(picture), self.nuisance_slopes[1], 0)
             for picture in (8, 9)
@@ -146,7 +145,7 @@ def test_elimination_leaves_of_any_residuals_what_least_squares_does(case):
         assert left @ left == pytest.approx(np.sum((goal - rows[:, PHI:] @ best) ** 2), rel=1e-9)
 
 
-NAMED = "force cloud recoil release camera hand jitter shift turn bias drift pose slow_loss".split()
+NAMED = "force cloud recoil release camera hand jitter shift turn bias drift pose".split()
 
 
 @pytest.mark.parametrize("name", NAMED)
@@ -155,6 +154,24 @@ def test_each_tolerance_widens_what_is_known(case, name):
     eigenvalues = np.linalg.eigvalsh(case.expanded().hessian - wide.hessian)
     size = np.abs(case.expanded().hessian).max()
     assert eigenvalues.max() > 1e-9 * size and eigenvalues.min() > -1e-9 * size
+
+
+def test_recordings_repeat_what_the_law_gets_wrong_of_the_recoil_and_no_instrument(case):
+    """Three alike: where the recoil's law alone errs they tell as much as one, else more."""
+
+    def together(case: Case) -> np.ndarray:
+        return 3 * case.expanded(alike=3).hessian
+
+    exact = dict.fromkeys(("release", "camera", "hand", "jitter", "shift", "turn", "drift"), 1e-12)
+    exact |= dict.fromkeys(("bias", "gain", "pose"), 1e-12)
+    by_law = Case(**exact, force=1e9, cloud=1e-12)
+    np.testing.assert_allclose(together(by_law), by_law.expanded().hessian, rtol=1e-6)
+    by_instruments = Case(recoil=1e-12)
+    np.testing.assert_allclose(
+        together(by_instruments), 3 * by_instruments.expanded().hessian, rtol=1e-6
+    )
+    least = np.linalg.eigvalsh(together(case) - case.expanded().hessian).min()
+    assert least > -1e-9 * np.abs(together(case)).max()
 
 
 def test_tolerances_are_the_episodes_own_or_as_usual():

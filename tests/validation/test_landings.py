@@ -28,9 +28,9 @@ def test_each_band_is_recorded_by_each_pull_and_compared_by_its_first_recording(
         assert len(set(every)) == len(every) and {job.seed for job in every} == {seed}
         other = [job for job in every if job.launched or job.method != POSTERIOR]
         compared = {
-            "paper, the paper's method",
-            "informative, the paper's method",
-            "informative, one launch",
+            "paper, virgin, the paper's method",
+            "informative, virgin, the paper's method",
+            "informative, virgin, one launch",
         }
         assert {job.kind for job in other} == (compared if 0 in numbers else set())
         assert len(other) == len(bands) * len({job.kind for job in other})
@@ -73,15 +73,15 @@ def summary() -> dict:
 
 
 def test_biases_of_a_bands_recordings_do_not_cancel(summary) -> None:
-    together = summary["paper"]["together"]
-    assert summary["paper"]["bands"]["a"]["mean_bias"] == pytest.approx(0)
+    together = summary["paper, virgin"]["together"]
+    assert summary["paper, virgin"]["bands"]["a"]["mean_bias"] == pytest.approx(0)
     assert together["mean_size_of_bias"] == pytest.approx((0.04 + 0.01) / 2)
     assert abs(together["worst_bias"]) == pytest.approx(0.04)  # of a recording
 
 
 def test_a_launch_beyond_the_area_counts(summary) -> None:
     """0.4 m too far is beyond it from seven of the targets."""
-    together = summary["paper"]["together"]
+    together = summary["paper, virgin"]["together"]
     assert (together["launches"], together["failed"]) == (27, 0)
     assert together["mean_miss_m"] == pytest.approx(((0.05 + 0.4) / 2 + 0.05) / 2)
     assert together["coverage"] == pytest.approx((0.5 + 1) / 2)
@@ -93,16 +93,16 @@ def test_a_launch_beyond_the_area_counts(summary) -> None:
 def test_a_launch_that_does_not_land_is_no_launch(summary) -> None:
     lost = scores(0.04, 0.05)
     lost["miss"][0] = lost["error"][3] = None
-    (of,) = (figures([JOB | {"scores": lost}])[kind]["together"] for kind in ("paper",))
+    (of,) = (figures([JOB | {"scores": lost}])[kind]["together"] for kind in ("paper, virgin",))
     assert (of["launches"], of["failed"], of["coverage"]) == (8, 2, 1.0)
 
 
 def test_what_is_compared_with_another_method_is_of_the_same_recordings(summary) -> None:
-    first = summary[f"paper, {FIRST}"]
+    first = summary[f"paper, virgin, {FIRST}"]
     assert first["together"]["mean_size_of_bias"] == pytest.approx((0.04 + 0.01) / 2)
     assert first["bands"]["a"]["bias"] == pytest.approx([0.04])
-    assert first["settled"] == [2, 2] and summary["paper"]["settled"] == [2, 3]
-    assert summary["paper"]["refused"] == {"a 2": "no band"}
+    assert first["settled"] == [2, 2] and summary["paper, virgin"]["settled"] == [2, 3]
+    assert summary["paper, virgin"]["refused"] == {"a 2": "no band"}
 
 
 class Everywhere:

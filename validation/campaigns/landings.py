@@ -50,15 +50,8 @@ OTHERWISE: tuple[tuple[str, dict], ...] = (  # how the first recording of a band
     ("informative", {"method": PAPER}),
     ("paper", {"method": PAPER}),
 )
-FIRST = "first recordings"
-STORED = (
-    "parameters",
-    "derived",
-    "settled",
-    "edges",
-    "effective_samples",
-    "steps",
-)  # what is stored of a confidence
+COMPARED, FIRST = ("informative, virgin", "paper, virgin"), "first recordings"
+STORED = "parameters", "derived", "settled", "edges", "steps"  # what is stored of a confidence
 BANDS = "band1", "band2", "band3"
 FRESH = range(200, 220)  # recordings of the rig's bands that no choice was made by
 BOOTSTRAP = 2000
@@ -83,7 +76,7 @@ class OneRecording:
     @property
     def kind(self) -> str:
         """What the figures take together: all recordings of all bands."""
-        parts = [self.pull, *(["the paper's method"] if self.method == PAPER else [])]
+        parts = [self.pull, "virgin", *(["the paper's method"] if self.method == PAPER else [])]
         return ", ".join([*parts, *(["one launch"] if self.launched else [])])
 
     @property
@@ -119,7 +112,7 @@ def jobs(name: str, most: int = len(FRESH)) -> list[OneRecording]:
 def identified(job: OneRecording, work: Path) -> dict:
     """Scores of a method by one recording, and what it says of itself."""
     params, begin = job.params, time.process_time()
-    folder = work / f"{job.band}-{job.pull}-{job.number}"
+    folder = work / f"{job.seed}-{job.band}-{job.pull}-{job.number}"
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "lock").open("w") as lock:  # one records, others of the same recording wait
         fcntl.flock(lock, fcntl.LOCK_EX)
@@ -157,7 +150,7 @@ def figures(lines: list[dict]) -> dict:
     for line in lines:
         job = job_of(line, OneRecording)
         kinds.setdefault(job.kind, []).append(line)
-        if job.number == 0 and job.kind in PULLS:  # what the paper's method has seen too
+        if job.number == 0 and job.kind in COMPARED:  # what the paper's method has seen too
             kinds.setdefault(f"{job.kind}, {FIRST}", []).append(line)
     for kind, some in sorted(kinds.items()):
         good, bad = (
@@ -207,13 +200,13 @@ def together(of_bands: dict[str, dict]) -> dict:
 
 
 ROWS = {  # of the table
-    "informative": "dips",
-    "informative, one launch": "dips, one launch",
-    f"informative, {FIRST}": "dips, first",
-    "informative, the paper's method": "… by `paper`",
-    "paper": "paper's pull",
-    f"paper, {FIRST}": "paper's pull, first",
-    "paper, the paper's method": "… by `paper`",
+    "informative, virgin": "dips",
+    "informative, virgin, one launch": "dips, one launch",
+    f"informative, virgin, {FIRST}": "dips, first",
+    "informative, virgin, the paper's method": "… by `paper`",
+    "paper, virgin": "paper's pull",
+    f"paper, virgin, {FIRST}": "paper's pull, first",
+    "paper, virgin, the paper's method": "… by `paper`",
 }
 WORDS = {
     "bands": "rig (3)",
@@ -256,17 +249,17 @@ def table(contents: dict[str, dict]) -> list[str]:
 
 def sentence(content: dict) -> list[str]:
     """What README says of them, of the report of the sealed rubbers."""
-    means, bands = (content["figures"]["informative"][key] for key in ("together", "bands"))
+    means, bands = (content["figures"]["informative, virgin"][key] for key in ("together", "bands"))
     size, worst, inside, width = (
         100 * means[key] for key in ("mean_size_of_bias", "worst_bias", "coverage", "median_width")
     )
     ours, theirs = (
         100 * content["figures"][kind]["together"]["mean_size_of_bias"]
-        for kind in (f"paper, {FIRST}", "paper, the paper's method")
+        for kind in (f"paper, virgin, {FIRST}", "paper, virgin, the paper's method")
     )
     biases = [
         {name: abs(band["bias"][0]) for name, band in content["figures"][kind]["bands"].items()}
-        for kind in (f"paper, {FIRST}", "paper, the paper's method")
+        for kind in (f"paper, virgin, {FIRST}", "paper, virgin, the paper's method")
     ]
     nearer = sum(biases[0][name] < biases[1].get(name, np.nan) for name in biases[0])
     text = (

@@ -222,7 +222,7 @@ def figures(lines: list[dict]) -> dict:
 
 def inside(parts: Sequence[float | None]) -> list[int]:
     """How many launches are inside their 90 % intervals, by their shares below, and of how many."""
-    landed = np.array(parts, float)
+    landed = np.asarray(parts, dtype=float)
     landed = landed[np.isfinite(landed)]
     return [int(np.sum(np.abs(landed - 0.5) <= LEVEL / 2)), len(landed)]
 

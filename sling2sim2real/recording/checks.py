@@ -405,14 +405,12 @@ def _of_clock(stream: Stream, roles: list[str], force: float) -> Iterator[Findin
     if not -most <= offset <= AHEAD:
         what = f"the stamps of {stream.topic} are {offset:+.3f} s off the force's, judged"
         yield found("clock", f"{what} by the times of receipt")
-    clock = stream.clock
-    if abs(clock.change) > max(DRIFTED, SURE * clock.error):
-        size = f"{1e3 * clock.change:+.1f} ± {1e3 * clock.error:.1f} ms"
-        how = "over the recording" if clock.step is None else f"at about {clock.step:.0f} s"
-        goes = "drifts" if clock.step is None else "steps"
-        what = f"the clock of {stream.topic} {goes} by {size} against the force's {how}, judged"
-        refused = abs(clock.change) > max(UNKNOWN_CLOCK, SURE * clock.error)
-        yield found("clock", f"{what} by the times of receipt", refused=refused)
+    change, error = stream.drift
+    if abs(change) > max(DRIFTED, SURE * error):
+        what = f"the clock of {stream.topic} drifts or steps by {1e3 * change:+.1f} ±"
+        what += f" {1e3 * error:.1f} ms against the force's, judged by the times of receipt"
+        refused = abs(change) > max(UNKNOWN_CLOCK, SURE * error)
+        yield found("clock", what, refused=refused)
 
 
 def _of_frames(frame: str, geometry: Geometry, transforms) -> Iterator[Finding]:

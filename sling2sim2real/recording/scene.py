@@ -169,16 +169,10 @@ class View:
             return None
 
     def undecoded(self, role: str) -> UserError:
-        """Error that no picture of this role could be decoded, with the decoder's reason."""
-        stream = getattr(self.recording, role)
-        reason = "of another size than its camera info"
-        try:
-            getattr(images, role)(stream.values[self.index[0][role == "color"]])
-        except images.Undecodable as error:
-            reason = str(error)
+        """That no picture of this role can be decoded."""
         return UserError(
-            f"{self.recording.path}: no {'colour' if role == 'color' else role} picture of"
-            f" {stream.topic} between the window's start and end can be decoded: {reason}"
+            f"{self.recording.path}: no picture of {getattr(self.recording, role).topic} between"
+            " the window's start and end can be decoded, or is of its camera info's size"
         )
 
     def stamp(self, number: int) -> int:
@@ -277,35 +271,26 @@ class View:
 LOOKS, LEAST = 15, 3  # pictures that are looked at, and of which the hand must be known
 AROUND = 4  # pixels to each side of the hand
 FITS = 1.3  # by which factor the hand's depth may be off for what covers it
-OFF_CENTER = 0.2  # of a picture's size: a lens is before its middle
 
 
 def why_no_band(view: View) -> str:
-    """What of the camera does not go with what is known of the hand, "" where all does."""
-    camera = view.recording.depth_camera
+    """What of the depth does not go with what is known of the hand, "" where all does."""
     numbers = np.linspace(0, len(view) - 1, LOOKS).astype(int).tolist()
     looked = {number: view.depth(number) for number in numbers}
-    blank = sum(depth is not None and not depth.any() for depth in looked.values())
-    if blank > len(looked) / 4:
-        count = len(looked)
+    blank, count = (
+        sum(depth is not None and not depth.any() for depth in looked.values()),
+        len(looked),
+    )
+    if blank > count / 4:
         return f"{blank} of {count} depth pictures hold no depth at all: does the emitter blink?"
-    size = np.array([camera.width, camera.height])
-    center = camera.matrix[[0, 1], 2]
-    if np.any(np.abs(center / size - 0.5) > OFF_CENTER):
-        at, whole = (f"{a:.0f} x {b:.0f}" for a, b in (center, size))
-        return (
-            f"the depth camera's principal point is at {at} of {whole} pixels: its camera_info is"
-            " of another resolution"
-        )
     factors = np.array([*_hand(view, looked)])
     off = (factors < 1 / FITS) | (factors > FITS)
     if len(factors) < LEAST or off.mean() < 0.5:
         return ""
-    factor = float(f"{np.median(factors):.2g}")
     return (
-        f"the depth is about {factor:g} times what it must be at the hand: publish it as 16UC1 in"
-        " millimetres or 32FC1 in metres, of the byte order that it says, or check the camera's"
-        " pose"
+        f"the depth is about {float(f'{np.median(factors):.2g}'):g} times what it must be at the"
+        " hand: publish it as 16UC1 in millimetres or 32FC1 in metres, of the byte order that it"
+        " says, or check the camera's pose and camera_info"
     )
 
 

@@ -117,7 +117,7 @@ def test_rectified_images_have_the_camera_p() -> None:
             (32, 24),
             "images of /camera/image are 32 x 24 pixels, /camera/info is of 64 x 48",
         ),
-        (info(width=2**31, height=2**31), None, "pixels"),
+        (info(width=2**31, height=2**31), (64, 48), "2147483648 x 2147483648"),
     ],
 )
 def test_calibrations_that_do_not_fit(message, size, words) -> None:

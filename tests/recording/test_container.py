@@ -116,10 +116,11 @@ def test_a_file_that_is_cut_is_read_up_to_there(tmp_path) -> None:
     whole = [chunk([SCHEMA, channel(), message(0)]), chunk([message(1)]), chunk([message(2)])]
     file = read(tmp_path, *whole[:2], packed(whole[2:])[:-5], end=[], magic=b"")
     assert times(file) == [0, 1]
-    assert file.losses == ["the file has no end: cut off after 1.00 s"]
+    (loss,) = file.losses
+    assert loss.startswith("cut off or damaged after 1.00 s, about byte ")
     file = read(tmp_path, *whole[:2], packed(whole[2:])[:-5])
     assert times(file) == [0, 1]
-    assert any("cannot be read from about byte" in loss for loss in file.losses)
+    assert file.losses[0].startswith("cut off or damaged after 1.00 s")
 
 
 def test_the_checksum_of_an_unchunked_file(tmp_path) -> None:
@@ -129,7 +130,7 @@ def test_the_checksum_of_an_unchunked_file(tmp_path) -> None:
     assert times(contents) == [0, 1, 2, 3, 4] and (contents.losses, contents.notes) == ([], [])
     path.write_bytes(path.read_bytes().replace(b"1234567\x03", b"1234568\x03", 1))
     assert read_container(path).losses == [
-        "the checksum of all messages together does not hold: what is damaged is not known"
+        "the checksum of all messages together does not hold: some are damaged"
     ]
 
 
@@ -231,7 +232,7 @@ def test_names_are_shown_without_what_a_terminal_obeys(tmp_path, params) -> None
         ({"my.mcap": zstandard.compress(MAGIC)}, "my.mcap", "packed by zstd: unpack it"),
         ({"my.mcap": lz4.frame.compress(MAGIC)}, "my.mcap", "packed by LZ4: unpack it"),
         ({"my.mcap": bytes(50)}, "my.mcap", "not an MCAP file"),
-        ({"my.mcap": b""}, "my.mcap", "is empty"),
+        ({"my.mcap": b""}, "my.mcap", "not an MCAP file"),
         ({}, "my.mcap", "no such file"),
         ({}, "", "is a folder without a recording"),
         ({"my_0.mcap": b""}, "", "is a folder without a recording"),

@@ -11,13 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from sling2sim2real.recording.images import (
-    Undecodable,
-    color,
-    depth,
-    is_depth,
-    size_of,
-)
+from sling2sim2real.recording.images import Undecodable, color, depth
 from sling2sim2real.recording.messages import Picture
 
 RANDOM = np.random.default_rng(0)
@@ -73,7 +67,6 @@ def test_packed_colors(kind) -> None:
     data = cv2.imencode(kind, SMOOTH)[1].tobytes()
     for format in (kind[1:], f"rgb8; {kind[1:]} compressed bgr8", "unnamed"):
         picture = packed(format, data)
-        assert size_of(picture) == (64, 96) and not is_depth(picture)
         np.testing.assert_allclose(color(picture).astype(int), SMOOTH, atol=6)
     for cut in (data[: len(data) // 2], data[:30]):
         with pytest.raises(Undecodable):
@@ -92,7 +85,6 @@ def test_packed_colors(kind) -> None:
     ],
 )
 def test_packed_depths(picture) -> None:
-    assert is_depth(picture) and size_of(picture) == (5, 6)
     np.testing.assert_allclose(depth(picture), MILLIMETRES / 1000, rtol=1e-6)
 
 
@@ -142,15 +134,16 @@ WHOLE = raw("rgb8", BGR)
         (color, raw("bayer_rggb8", BGR[..., 0]), "'bayer_rggb8'"),
         (color, packed("16UC1; compressedDepth png", bytes(12) + png(MILLIMETRES)), "is depth"),
         (depth, WHOLE, "'rgb8'"),
-        (depth, packed("32FC1; png compressed", png(MILLIMETRES)), "compressedDepth"),
+        (depth, packed("32FC1; png compressed", png(MILLIMETRES)), "header of 12 bytes"),
+        (color, packed("png", png(MILLIMETRES)), "is depth, not colour"),
         (depth, packed("32FC1; compressedDepth png", png(MILLIMETRES)), "header of 12 bytes"),
         (depth, packed("16UC1; compressedDepth png", bytes(12) + png(BGR[..., 0])), "uint8"),
-        (depth, packed("png", png(BGR)), "in colour"),
-        (depth, packed("16UC1; compressedDepth rvl", bytes(99)), "RVL"),
-        (depth, raw("8UC1", BGR[..., 0]), "'8UC1' is not known, use 16UC1"),
-        (depth, raw("16SC1", MILLIMETRES.astype(np.int16)), "'16SC1' is not known, use 16UC1"),
-        (depth, raw("64FC1", DEPTH.astype(float)), "'64FC1' is not known, use 16UC1"),
-        (color, raw("mono16", MILLIMETRES), "'mono16' is not known, use rgb8"),
+        (depth, packed("png", png(BGR)), "or in colour"),
+        (depth, packed("16UC1; compressedDepth rvl", bytes(99)), "rvl: damaged image, or neither"),
+        (depth, raw("8UC1", BGR[..., 0]), "'8UC1' is no depth, use 16UC1"),
+        (depth, raw("16SC1", MILLIMETRES.astype(np.int16)), "'16SC1' is no depth, use 16UC1"),
+        (depth, raw("64FC1", DEPTH.astype(float)), "'64FC1' is no depth, use 16UC1"),
+        (color, raw("mono16", MILLIMETRES), "'mono16' is no known colour, use rgb8"),
         (color, packed("jpeg", b""), "damaged"),
         (color, packed("jpeg", JPEG[:-2]), "cut off"),
         (color, packed("gif", cv2.imencode(".gif", BGR)[1].tobytes()), "neither JPEG"),
@@ -159,11 +152,11 @@ WHOLE = raw("rgb8", BGR)
             packed("jpeg", JPEG[:SIZE] + struct.pack(">HH", 65500, 65500) + JPEG[SIZE + 4 :]),
             "Bomb",
         ),
-        (depth, packed("16UC1; compressedDepth png", b"short"), "without a picture"),
-        (color, replace(WHOLE, content=WHOLE.data[:-1]), "89 bytes, 6 rows of 15 were said"),
-        (color, replace(WHOLE, step=14), "step 14: a row of 5 pixels of rgb8 takes 15 bytes"),
-        (color, replace(WHOLE, height=2**31, width=2**31, step=2**33), "raw image of 2147483648 x"),
-        (color, replace(WHOLE, height=0), "raw image of 5 x 0 pixels"),
+        (depth, packed("16UC1; compressedDepth png", b"short"), "damaged"),
+        (color, replace(WHOLE, content=WHOLE.data[:-1]), "6 rows of 15 bytes, in 89"),
+        (color, replace(WHOLE, step=14), "5 x 6 pixels of rgb8 cannot be 6 rows of 14 bytes"),
+        (color, replace(WHOLE, height=2**31, width=2**31, step=2**33), "2147483648 x"),
+        (color, replace(WHOLE, height=0), "5 x 0 pixels"),
     ],
 )
 def test_what_cannot_be_decoded_says_why(read, picture, words) -> None:
@@ -175,14 +168,6 @@ def test_what_cannot_be_decoded_says_why(read, picture, words) -> None:
 def test_a_step_that_is_missing_or_in_pixels(step) -> None:
     whole = raw("16UC1", MILLIMETRES)
     np.testing.assert_array_equal(depth(replace(whole, step=step)), depth(whole))
-
-
-def test_depth_is_told_from_color() -> None:
-    assert is_depth(raw("16UC1", MILLIMETRES)) and is_depth(raw("32FC1", DEPTH))
-    assert not is_depth(raw("rgb8", BGR))
-    assert is_depth(packed("16UC1; compressedDepth", b""))
-    assert not is_depth(packed("rgb8; jpeg compressed bgr8", b""))
-    assert not is_depth(packed("png", png(BGR[..., 0])))
 
 
 @given(st.binary(max_size=6000), st.booleans())

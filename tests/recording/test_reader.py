@@ -70,7 +70,7 @@ def test_each_message_is_decoded_once(seen, params, monkeypatch) -> None:
 def test_a_refusal_says_what_the_file_lost(blind, tmp_path, params) -> None:
     path = tmp_path / "cut.mcap"
     path.write_bytes(blind[0].read_bytes()[:2000])
-    with pytest.raises(UserError, match="no force.*the file has no end"):
+    with pytest.raises(UserError, match="no force.*cut off or damaged"):
         read(path, params)
 
 

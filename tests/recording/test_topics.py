@@ -182,7 +182,9 @@ def test_pictures_that_cannot_be_decoded_are_refused_beforehand(params) -> None:
     with pytest.raises(UserError, match="no colour images.*/cam/color/bayer.*'bayer_rggb8'"):
         chosen(params, wrench("/ft"), pose(), camera=[bayer, *CAMERA[1:]])
     assert chosen(params, wrench("/ft"), pose(), camera=[bayer, *CAMERA])
-    with pytest.raises(UserError, match="setup.topics.color: /cam/color/bayer: .*'bayer_rggb8'"):
+    with pytest.raises(
+        UserError, match="setup.topics.color is .*/cam/color/bayer: .*'bayer_rggb8'"
+    ):
         topics = {"color": "/cam/color/bayer"}
         chosen(params, wrench("/ft"), pose(), camera=[bayer, *CAMERA], topics=topics)
 
@@ -190,11 +192,17 @@ def test_pictures_that_cannot_be_decoded_are_refused_beforehand(params) -> None:
 @pytest.mark.parametrize(
     ("topics", "words"),
     [
-        ({"wrench": "/none"}, "setup.topics.wrench: no topic /none, the file has /arm/current"),
-        ({"pose": "/ft"}, "setup.topics.pose: /ft is a geometry_msgs/WrenchStamped, not PoseSt"),
-        ({"pose": "/js"}, "setup.topics.pose: /js has the joints j1, j2, j3: put the robot's URDF"),
-        ({"depth": "/cam/color/image"}, "setup.topics.depth: /cam/color/image: .*'rgb8'"),
-        ({"color_info": "/ft"}, "not CameraInfo or CameraCalibration"),
+        ({"wrench": "/none"}, "setup.topics.wrench is /none; the file has /arm/current"),
+        (
+            {"pose": "/ft"},
+            "setup.topics.pose is /ft; .*/ft .Wrench.* none of a type that is read for it .PoseSt",
+        ),
+        (
+            {"pose": "/js"},
+            "setup.topics.pose is /js; /js has the joints j1, j2, j3: put the robot's URDF",
+        ),
+        ({"depth": "/cam/color/image"}, "setup.topics.depth is .*/cam/color/image: .*'rgb8'"),
+        ({"color_info": "/ft"}, "read for it .CameraInfo, CameraCalibration"),
     ],
 )
 def test_named_topics_that_will_not_do(params, topics, words) -> None:
@@ -218,6 +226,8 @@ def test_a_topic_that_cannot_be_read_is_named_if_nothing_else_will_do(
     other.add(1, b"{}")
     with pytest.raises(UserError, match=words):
         chosen(params, other, pose())
-    with pytest.raises(UserError, match="setup.topics.wrench: (/ft is a json|topic /ft: schema)"):
+    with pytest.raises(
+        UserError, match="setup.topics.wrench is /ft; (the file has|topic /ft: schema)"
+    ):
         chosen(params, other, pose(), topics={"wrench": "/ft"})
     assert chosen(params, other, wrench("/ft2"), pose())["wrench"].topic.name == "/ft2"

@@ -322,12 +322,11 @@ def of_pictures(
         return
     phases = by_phase(rows)
     for row in phases:
-        if row.coverage < COVERAGE.get(row.phase, 0.0):
-            what = f"{100 * row.coverage:.0f} % of the band is covered while it"
-            yield found(
-                "coverage", f"{what} {SEEN_AS[row.phase]} ({row.start:.2f} - {row.end:.2f} s)"
-            )
-    for phase in SEEN_AS.keys() - {row.phase for row in phases}:
+        if row["coverage"] < COVERAGE.get(row["phase"], 0.0):
+            what = f"{100 * row['coverage']:.0f} % of the band is covered while it"
+            times = f"({row['start']:.2f} - {row['end']:.2f} s)"
+            yield found("coverage", f"{what} {SEEN_AS[row['phase']]} {times}")
+    for phase in SEEN_AS.keys() - {row["phase"] for row in phases}:
         cure = "record the camera from before the grasp until the band has swung"
         yield found("coverage", f"no picture shows how the band {SEEN_AS[phase]}", cure)
     measured = [(row.time, row.off_plane) for row in rows if row.off_plane is not None]

@@ -128,10 +128,11 @@ class EpisodeGeometry:
     def content(self) -> dict[str, Any]:
         """Return the geometry for an episode's metadata, where it stands under `geometry`."""
         camera = asdict(self.camera)
+        arrays = {key: camera[key].tolist() for key in ("matrix", "distortion")}
         return {
             "base_frame": self.base_frame,
             "base_to_fork": self.base_to_fork.pose(),
-            "camera": camera | {key: camera[key].tolist() for key in ("matrix", "distortion")},
+            "camera": camera | arrays,
             "camera_to_fork": self.camera_to_fork.pose(),
         }
 
@@ -146,12 +147,8 @@ class EpisodeGeometry:
             )
         camera = content["camera"]
         arrays = {key: np.array(camera[key], float) for key in ("matrix", "distortion")}
-        return cls(
-            content["base_frame"],
-            Transform.of(content["base_to_fork"]),
-            Camera(camera["width"], camera["height"], **arrays, frame=camera["frame"]),
-            Transform.of(content["camera_to_fork"]),
-        )
+        poses = {key: Transform.of(content[key]) for key in ("base_to_fork", "camera_to_fork")}
+        return cls(base_frame=content["base_frame"], camera=Camera(**camera | arrays), **poses)
 
 
 def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:

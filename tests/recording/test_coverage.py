@@ -52,8 +52,8 @@ def test_coverage_over_time_follows_the_phases(checked, seen) -> None:
         assert (row.phase == "hanging") == (row.time < checked.start + checked.signals.grasp_time)
         assert (row.phase in ("recoil", "swing")) == (row.time >= truth.release)
     phases = by_phase(checked.coverage)
-    assert [row.phase for row in phases] == ["hanging", "held", "drawn", "recoil", "swing"]
-    assert sum(row.pictures for row in phases) == len(rows)
+    assert [row["phase"] for row in phases] == ["hanging", "held", "drawn", "recoil", "swing"]
+    assert sum(row["pictures"] for row in phases) == len(rows)
 
 
 def test_a_cloud_without_one_side_covers_half(checked) -> None:

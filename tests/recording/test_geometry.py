@@ -1,18 +1,25 @@
-"""Frames that are joined, given, or missing."""
+"""Frames that are joined, given or missing; transforms and kinematics against other libraries."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yourdfpy
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording import kinematics
+from sling2sim2real.recording.files import Container
 from sling2sim2real.recording.frames import geometry_of
+from sling2sim2real.recording.kinematics import chain_of
+from sling2sim2real.recording.topics import transforms_of
 from sling2sim2real.recording.transforms import Transform, TransformTree
+from tests.recording.messages import channel
 
 SETUP = SimpleNamespace(base_to_fork=None, camera_to_fork=None, tip_link=None, fork_width=0.275)
 TURN = Rotation.from_euler("z", 30, degrees=True)
@@ -173,3 +180,147 @@ def test_a_missing_frame_is_one_line(joins, depth, words) -> None:
     with pytest.raises(UserError, match=words) as caught:
         geometry_of(recording(joins, depth=depth), SETUP)
     assert str(caught.value).startswith("some.mcap: ") and "\n" not in str(caught.value)
+
+
+number = st.floats(-5, 5)
+vectors = st.tuples(number, number, number)
+quaternions = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: 0.1 < np.linalg.norm(q))
+poses = st.tuples(vectors, quaternions).map(
+    lambda pair: (*pair[0], *(np.array(pair[1]) / np.linalg.norm(pair[1])))
+)
+
+
+def moved(pose: tuple, point: np.ndarray) -> np.ndarray:
+    """Rotate by the quaternion (u, w): v + 2 w (u x v) + 2 u x (u x v), then shift."""
+    u, w = np.array(pose[3:6]), pose[6]
+    twice = 2 * np.cross(u, point)
+    return point + w * twice + np.cross(u, twice) + pose[:3]
+
+
+@given(poses, vectors)
+def test_a_pose_moves_points(pose, point) -> None:
+    np.testing.assert_allclose(Transform.of(pose).apply(point), moved(pose, point), atol=1e-9)
+
+
+@given(poses, poses, poses, vectors)
+def test_the_tree_joins_cousins(a, b, c, point) -> None:
+    tree = TransformTree()
+    tree.add("root", "arm", Transform.of(a))
+    tree.add("arm", "hand", Transform.of(b))
+    tree.add("/root", "camera", Transform.of(c))
+    in_root = moved(a, moved(b, np.array(point)))
+    in_camera = tree.between("camera", "hand").apply(point)
+    np.testing.assert_allclose(moved(c, in_camera), in_root, atol=1e-7)
+
+
+def test_frames_that_nothing_joins() -> None:
+    tree = TransformTree()
+    pose = Transform.of([0, 0, 1, 0, 0, 0, 1])
+    tree.add("root", "arm", pose)
+    tree.add("tool", "sensor", pose)
+    assert tree.between("root", "sensor") is None
+    assert tree.frames == ["arm", "root", "sensor", "tool"]
+    assert tree.is_root("tool") and not tree.is_root("sensor")
+
+
+def test_a_loop_ends() -> None:
+    tree = TransformTree()
+    pose = Transform.of([0, 0, 1, 0, 0, 0, 1])
+    tree.add("a", "b", pose)
+    tree.add("b", "a", pose)
+    assert tree.between("c", "a") is None
+
+
+def edge(parent: str, child: str, x: float, k: int) -> dict:
+    return {
+        "timestamp": {"sec": 5, "nsec": k},
+        "parent_frame_id": parent,
+        "child_frame_id": child,
+        "translation": {"x": x, "y": 0, "z": 0},
+        "rotation": {"x": 0, "y": 0, "z": 0, "w": 1},
+    }
+
+
+def test_foxglove_transforms_that_keep_still_are_static() -> None:
+    moving = [edge("base", "hand", 0.1 * k, k) for k in range(5)]
+    still = [edge("base", "fork", 0.5, k) for k in range(5)]
+    once = {"transforms": [edge("fork", "camera", 0.25, 0)]}
+    many = channel("/tf", "foxglove.FrameTransform", [*moving, *still])
+    batch = channel("/tf2", "foxglove.FrameTransforms", [once])
+    tree = transforms_of(Container(Path("f.mcap"), [many, batch], []))
+    np.testing.assert_allclose(tree.between("base", "camera").translation, [0.75, 0, 0])
+    assert tree.between("base", "hand") is None
+
+
+MIXED = """<robot name="mixed">
+  <link name="world"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+  <link name="e"/><link name="my_tcp"/><link name="finger"/>
+  <joint name="six" type="fixed"><parent link="e"/><child link="my_tcp"/>
+    <origin xyz="0.01 0.02 0.3" rpy="0.4 -1.1 2.0"/></joint>
+  <joint name="one" type="revolute"><parent link="world"/><child link="a"/>
+    <origin xyz="0.1 -0.2 0.3" rpy="0.3 0.2 0.1"/><axis xyz="0 0.6 0.8"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+  <joint name="two" type="prismatic"><parent link="a"/><child link="b"/>
+    <origin xyz="0 0.1 0.2" rpy="-0.5 0 1.2"/><axis xyz="0.36 0.48 0.8"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+  <joint name="three" type="continuous"><parent link="b"/><child link="c"/>
+    <axis xyz="0 0 1"/></joint>
+  <joint name="four" type="revolute"><parent link="c"/><child link="d"/><origin xyz="0.2 0 0"/>
+    <axis xyz="0 2 0"/><limit lower="-9" upper="9" effort="1" velocity="1"/></joint>
+  <joint name="five" type="revolute"><parent link="d"/><child link="e"/><origin rpy="0 1.5 0"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+  <joint name="finger_joint" type="prismatic"><parent link="e"/><child link="finger"/>
+    <axis xyz="0 1 0"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint>
+</robot>
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(kinematics, "FOLDER", tmp_path)
+    return tmp_path
+
+
+def matrices(poses: np.ndarray) -> np.ndarray:
+    result = np.tile(np.eye(4), (len(poses), 1, 1))
+    result[:, :3, :3] = Rotation.from_quat(poses[:, 3:]).as_matrix()
+    result[:, :3, 3] = poses[:, :3]
+    return result
+
+
+def test_every_kind_of_joint_as_yourdfpy_has_it(folder) -> None:
+    file = folder / "mixed.urdf"
+    file.write_text(MIXED)
+    chain = chain_of("mixed.urdf")
+    assert (chain.root, chain.tip) == ("world", "my_tcp")
+    assert chain.names == ("one", "two", "three", "four", "five")
+    other = yourdfpy.URDF.load(str(file), load_meshes=False, build_scene_graph=True)
+    positions = np.random.default_rng(0).uniform(-2, 2, (20, 5))
+    for row, ours in zip(positions, matrices(chain.poses(positions)), strict=True):
+        other.update_cfg(dict(zip(chain.names, row, strict=True)))
+        np.testing.assert_allclose(ours, other.get_transform("my_tcp", "world"), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "tip", "words"),
+    [
+        (None, None, "cannot be read"),
+        ("<robot", None, "not valid XML"),
+        ("<robot/>", None, "no robot with joints"),
+        ('<robot xmlns:xacro="http://ros.org/xacro"><xacro:a/></robot>', None, "is a xacro"),
+        (MIXED, "claw", "no link 'claw'"),
+        (MIXED.replace("my_tcp", "claw"), None, "setup.tip_link: name the link"),
+        (MIXED.replace('<axis xyz="0 0 1"/>', '<mimic joint="one"/>'), None, "three is mimic"),
+        (MIXED.replace('type="continuous"', 'type="floating"'), None, "three is floating"),
+        (MIXED.replace("0.36 0.48 0.8", "0 0 0"), None, "two: axis without length"),
+        (MIXED.replace("0.36 0.48 0.8", "1 2"), None, "is not three numbers"),
+        (MIXED.replace('<parent link="world"/>', '<parent link="my_tcp"/>'), None, "loop"),
+        (MIXED, "world", "no joint moves world"),
+    ],
+)
+def test_a_bad_urdf_is_one_line(folder, text, tip, words) -> None:
+    if text is not None:
+        (folder / "bad.urdf").write_text(text)
+    with pytest.raises(UserError, match=words) as caught:
+        chain_of("bad.urdf", tip)
+    assert "\n" not in str(caught.value)

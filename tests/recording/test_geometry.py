@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,12 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording import kinematics
-from sling2sim2real.recording.files import Container
 from sling2sim2real.recording.frames import geometry_of
 from sling2sim2real.recording.kinematics import chain_of
-from sling2sim2real.recording.topics import transforms_of
 from sling2sim2real.recording.transforms import Transform, TransformTree
-from tests.recording.messages import channel
 
 SETUP = SimpleNamespace(base_to_fork=None, camera_to_fork=None, tip_link=None, fork_width=0.275)
 TURN = Rotation.from_euler("z", 30, degrees=True)
@@ -229,27 +225,6 @@ def test_a_loop_ends() -> None:
     tree.add("a", "b", pose)
     tree.add("b", "a", pose)
     assert tree.between("c", "a") is None
-
-
-def edge(parent: str, child: str, x: float, k: int) -> dict:
-    return {
-        "timestamp": {"sec": 5, "nsec": k},
-        "parent_frame_id": parent,
-        "child_frame_id": child,
-        "translation": {"x": x, "y": 0, "z": 0},
-        "rotation": {"x": 0, "y": 0, "z": 0, "w": 1},
-    }
-
-
-def test_foxglove_transforms_that_keep_still_are_static() -> None:
-    moving = [edge("base", "hand", 0.1 * k, k) for k in range(5)]
-    still = [edge("base", "fork", 0.5, k) for k in range(5)]
-    once = {"transforms": [edge("fork", "camera", 0.25, 0)]}
-    many = channel("/tf", "foxglove.FrameTransform", [*moving, *still])
-    batch = channel("/tf2", "foxglove.FrameTransforms", [once])
-    tree = transforms_of(Container(Path("f.mcap"), [many, batch], []))
-    np.testing.assert_allclose(tree.between("base", "camera").translation, [0.75, 0, 0])
-    assert tree.between("base", "hand") is None
 
 
 MIXED = """<robot name="mixed">

@@ -75,13 +75,6 @@ def test_a_turning_hand_with_its_tool_gives_the_bands_force(params, played, give
     assert result.facts.flipped == (played.truth.sign < 0)
 
 
-def test_a_wrong_centre_of_mass_is_felt_where_the_hand_turns_fast(params) -> None:
-    played = Played(turn=1.5, mass=MASS, truth=Truth(noise=0.002))
-    right = off(played, signals(played, params, tool()))
-    wrong = off(played, signals(played, params, tool(center=(0.01, -0.02, 0.25))))
-    assert wrong.max() > right.max() + 0.3
-
-
 def test_the_inertia_of_a_hand_that_does_not_turn(params) -> None:
     """Without the tool's mass it stays in the force, with it is gone."""
     played = Played(mass=MASS, truth=Truth(noise=0.005))

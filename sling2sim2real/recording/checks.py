@@ -421,14 +421,14 @@ def _of_frames(frame: str, geometry: Geometry, transforms) -> Iterator[Finding]:
         what = f"/tf_static puts {name!r} at two places, of which the last counts"
         cure = "publish it once, or set setup.camera_to_fork or base_to_fork in params.yaml"
         yield found("frames", what, cure)
-    if geometry.loop and not geometry.loop.closed:
+    if geometry.contradiction:
         given = [
             f"setup.{name}"
             for name in ("base_to_fork", "camera_to_fork")
             if geometry.sources[name].startswith("setup")
         ]
         cure = f"{' or '.join(given)} contradicts /tf_static: {CHECKS['frames'].remedy}"
-        yield found("frames", str(geometry.loop), cure)
+        yield found("frames", geometry.contradiction, cure)
 
 
 def _of_delays(delays: Delays) -> Iterator[Finding]:

@@ -268,42 +268,30 @@ class View:
         return camera.window(np.floor(pixels.min(axis=0)) - 5, np.ceil(pixels.max(axis=0)) + 6)
 
 
-LOOKS, LEAST = 15, 3  # pictures that are looked at, and of which the hand must be known
+LOOKS = 15  # pictures that are looked at
 AROUND = 4  # pixels to each side of the hand
 FITS = 1.3  # by which factor the hand's depth may be off for what covers it
 
 
 def why_no_band(view: View) -> str:
-    """What of the depth does not go with what is known of the hand, "" where all does."""
-    numbers = np.linspace(0, len(view) - 1, LOOKS).astype(int).tolist()
-    looked = {number: view.depth(number) for number in numbers}
-    blank, count = (
-        sum(depth is not None and not depth.any() for depth in looked.values()),
-        len(looked),
-    )
-    if blank > count / 4:
-        return f"{blank} of {count} depth pictures hold no depth at all: does the emitter blink?"
-    factors = np.array([*_hand(view, looked)])
-    off = (factors < 1 / FITS) | (factors > FITS)
-    if len(factors) < LEAST or off.mean() < 0.5:
+    """What of the depth does not go with where the hand is, "" where all does."""
+    camera, place = view.recording.depth_camera, view.geometry.camera.inverse()
+    factors = []
+    for number in np.linspace(0, len(view) - 1, LOOKS).astype(int).tolist():
+        depth, hand = view.depth(number), place.apply(view.scene.signals.hand(view.times[number]))
+        if depth is None or hand[2] <= 0:
+            continue
+        pixel = np.round(camera.project(hand[None])[0])
+        near = depth[camera.window(pixel - AROUND, pixel + AROUND + 1)]
+        if near.any():
+            factors.append(float(np.median(near[near > 0])) / hand[2])
+    if not factors:
+        return "there is no depth where the hand must be: does the emitter blink?"
+    factor = float(f"{np.median(factors):.2g}")
+    if 1 / FITS < factor < FITS:
         return ""
     return (
-        f"the depth is about {float(f'{np.median(factors):.2g}'):g} times what it must be at the"
-        " hand: publish it as 16UC1 in millimetres or 32FC1 in metres, of the byte order that it"
-        " says, or check the camera's pose and camera_info"
+        f"the depth is about {factor:g} times what it must be at the hand: publish it as 16UC1 in"
+        " millimetres or 32FC1 in metres, of the byte order that it says, or check the camera's"
+        " pose and camera_info"
     )
-
-
-def _hand(view: View, looked: dict[int, np.ndarray | None]) -> Iterator[float]:
-    """Depth where the hand must be, over what it must be, of pictures in which both are known."""
-    camera, place = view.recording.depth_camera, view.geometry.camera.inverse()
-    for number, depth in looked.items():
-        hand = place.apply(view.scene.signals.hand(view.times[number])[None])
-        if depth is None or hand[0, 2] <= 0:
-            continue
-        u, v = np.round(camera.project(hand)[0]).astype(int)
-        if not (AROUND <= u < camera.width - AROUND and AROUND <= v < camera.height - AROUND):
-            continue
-        near = depth[v - AROUND : v + AROUND + 1, u - AROUND : u + AROUND + 1]
-        if near.any():
-            yield float(np.median(near[near > 0])) / hand[0, 2]

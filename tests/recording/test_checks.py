@@ -4,7 +4,6 @@ import ast
 import re
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -114,7 +113,7 @@ def test_frames_that_are_not_there_or_twice_are_said(checked) -> None:
     wrench = replace(checked.pull.recording.wrench, frame="elsewhere")
     words = [finding.what for finding in of_topics(with_recording(checked, wrench=wrench))]
     assert any("does not know the force's frame 'elsewhere'" in what for what in words)
-    geometry = replace(checked.pull.geometry, loop=SimpleNamespace(closed=False))
+    geometry = replace(checked.pull.geometry, contradiction="1 m off")
     assert "frames" in abouts(of_topics(Part(checked.pull.recording, geometry)))
 
 

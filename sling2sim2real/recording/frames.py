@@ -29,7 +29,7 @@ SURE = 3.0  # of them, from which it is no chance
 def loop_of(
     base_to_fork: Transform, camera_to_fork: Transform, base_to_camera: Transform, width: float
 ) -> tuple[str, bool]:
-    """What the loop of three poses is open by, in words, and whether errors of measuring explain it.
+    """What the loop of three poses is open by, in words; whether errors of measuring explain it.
 
     Args:
         base_to_fork, camera_to_fork, base_to_camera: Of the fork in base and camera, and of the
@@ -159,7 +159,7 @@ def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
         raise _missing(recording, "base_to_fork", pose_frame, color_frame)
     if color_to_fork is None:
         raise _missing(recording, "camera_to_fork", color_frame, pose_frame)
-    join, contradiction = f"/tf_static {pose_frame} <- {color_frame}", ""
+    join, odd = f"/tf_static {pose_frame} <- {color_frame}", ""
     if transforms[0] is None:
         sources["base_to_fork"] = f"{sources['camera_to_fork']}, and {join}"
     elif transforms[1] is None:
@@ -167,7 +167,7 @@ def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
     elif between is not None and any(source.startswith("setup") for source in sources.values()):
         poses = base.inverse(), color_to_fork.inverse(), between
         sources["loop"], explained = loop_of(*poses, setup.fork_width)
-        contradiction = "" if explained else sources["loop"]
+        odd = "" if explained else sources["loop"]
     color = _between_cameras(recording, color_frame, depth_frame)
 
     fixed = tree.between(pose_frame, wrench_frame) if wrench_frame else None

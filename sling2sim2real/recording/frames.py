@@ -178,9 +178,7 @@ def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
         tool = _tool_frame(tree, wrench_frame, setup.tip_link)
         sensor = tree.between(tool, wrench_frame) or Transform.identity()
         sources["wrench"] = f"{wrench_frame} on {tool}, which the pose topic is taken to move"
-    return Geometry(
-        base, color_to_fork @ color, color, sensor, fixed is not None, sources, contradiction
-    )
+    return Geometry(base, color_to_fork @ color, color, sensor, fixed is not None, sources, odd)
 
 
 def _missing(recording: Recording, name: str, frame: str, other: str) -> UserError:

@@ -29,7 +29,7 @@ from tests.recording.conftest import part_of, pull_of, written
 from tests.recording.parts import joined
 from validation.recordings.bag import START, Truth, blind_bag, edit
 
-DIRECTION = np.array([0.3, -0.8, 0.52])
+DIRECTION, BIAS = np.array([0.3, -0.8, 0.52]), np.array([3.0, -2.0, 7.0])
 
 
 def pull(
@@ -39,7 +39,7 @@ def pull(
     t = np.arange(start, 9, 1 / rate)
     held = 12 * np.clip((t - 2) / 3, 0, 1)
     left = np.clip(1 - (t - release) / fall, 0, 1) if fall else (t < release)
-    force = (held * left)[:, None] * DIRECTION / np.linalg.norm(DIRECTION) + [3.0, -2.0, 7.0]
+    force = (held * left)[:, None] * DIRECTION / np.linalg.norm(DIRECTION) + BIAS
     return t, force + np.random.default_rng(seed).normal(0, noise, force.shape)
 
 
@@ -74,107 +74,99 @@ def test_a_fall_within_one_sample_is_put_between_the_two() -> None:
     assert event.error == pytest.approx(1e-3 / np.sqrt(12), rel=0.15)
 
 
-def test_ringing_and_a_bump_before_do_not_move_the_release() -> None:
-    t, force = pull(7.5, 0.0, 0.03, 3)
-    force[:, 1] += 1.5 * np.exp(-(((t - 4.0) / 0.05) ** 2))
+def rings(t: np.ndarray, force: np.ndarray) -> None:
+    force[:, 1] += 1.5 * np.exp(-(((t - 4.0) / 0.05) ** 2))  # and a bump before
     late = np.maximum(t - 7.5, 0)
     force += (np.exp(-late / 0.01) * np.sin(900 * late))[:, None]
-    assert abs(find_release(t, force).time - 7.5) <= 1e-3
 
 
-def test_a_gap_at_the_release_is_refused_and_one_elsewhere_is_not() -> None:
+def knocked(t: np.ndarray, force: np.ndarray) -> None:
+    force[(t > 0.6) & (t < 0.62)] += [0.0, 40.0, 0.0]
+
+
+def slips(t: np.ndarray, force: np.ndarray) -> None:
+    """The band slides through the fingers, which costs more than what is left to let go."""
+    force[t >= 5.5] = BIAS + 0.4 * (force[t >= 5.5] - BIAS)
+
+
+def caught_again(t: np.ndarray, force: np.ndarray) -> None:
+    force[t >= 4.0] = BIAS
+    force[t > 5.5] = pull(7.5, 0.0, 0.03, 4)[1][t > 5.5]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "missing", "found"),
+    [
+        (rings, (9.0, 9.0), []),
+        (knocked, (9.0, 9.0), []),
+        (slips, (9.0, 9.0), [5.5]),
+        (rings, (6.0, 6.5), []),
+        (rings, (7.48, 7.51), "missing for 3[0-9] ms around the release"),
+        (caught_again, (9.0, 9.0), r"let go at 4\.0 and 7\.5 s"),
+    ],
+)
+def test_what_comes_before_does_not_move_the_release(spoil, missing, found) -> None:
+    """Slips are told; a gap there, and two releases that no fingers tell apart, are refused."""
     t, force = pull(7.5, 0.0, 0.03, 3)
-    there = (t < 7.48) | (t > 7.51)
-    with pytest.raises(UserError, match="missing for 3[0-9] ms around the release"):
-        find_release(t[there], force[there])
-    elsewhere = (t < 6.0) | (t > 6.5)
-    assert abs(find_release(t[elsewhere], force[elsewhere]).time - 7.5) <= 1e-3
+    spoil(t, force)
+    kept = (t < missing[0]) | (t > missing[1])
+    if isinstance(found, str):
+        with pytest.raises(UserError, match=found):
+            find_release(t[kept], force[kept])
+        fingers = gripper(1.0, 7.53)
+        assert spoil is rings or abs(find_release(t, force, fingers).time - 7.5) <= 1e-3
+        return
+    event = find_release(t[kept], force[kept])
+    assert abs(event.time - 7.5) <= 1e-3
+    assert event.drop == pytest.approx(12 * (0.4 if found else 1), rel=0.03)
+    np.testing.assert_allclose(event.slips, found, atol=0.01)
 
 
 def test_no_release() -> None:
-    t, force = pull(20.0, 0.0, 0.03, 1)
     with pytest.raises(UserError, match="no release"):
-        find_release(t, force)
+        find_release(*pull(20.0, 0.0, 0.03, 1))
 
 
-def test_a_slip_before_is_no_release_but_is_reported() -> None:
-    """The band slides through the fingers, which costs more than what is left to let go."""
-    t, force = pull(7.5, 0.0, 0.03, 3)
-    bias = np.array([3.0, -2.0, 7.0])
-    force[t >= 5.5] = bias + 0.4 * (force[t >= 5.5] - bias)
-    event = find_release(t, force)
-    assert abs(event.time - 7.5) <= 1e-3
-    assert event.drop == pytest.approx(0.4 * 12, rel=0.02)
-    np.testing.assert_allclose(event.slips, [5.5], atol=0.01)
-
-
-def test_a_knock_in_the_lead_in_is_no_release() -> None:
-    t, force = pull(7.5, 0.0, 0.03, 3)
-    force[(t > 0.6) & (t < 0.62)] += [0.0, 40.0, 0.0]
-    event = find_release(t, force)
-    assert abs(event.time - 7.5) <= 1e-3 and event.slips == []
-
-
-def test_two_pulls_are_refused_unless_the_fingers_tell() -> None:
-    t, force = pull(4.0, 0.0, 0.03, 3)
-    again = pull(7.5, 0.0, 0.03, 4)[1]
-    force[t > 5.5] = again[t > 5.5]  # caught again at 12 N
-    with pytest.raises(UserError, match=r"let go at 4\.0 and 7\.5 s"):
-        find_release(t, force)
-    assert abs(find_release(t, force, gripper(1.0, 7.53)).time - 7.5) <= 1e-3
-
-
-def moving(t: np.ndarray, path: np.ndarray) -> Motion:
+def resting(t: np.ndarray, path: np.ndarray | float = 0.0) -> Motion:
+    path = path + np.zeros((len(t), 3))
     return Motion(t, path, Rotation.identity(len(t)), float(np.median(np.diff(t))))
 
 
-def resting(t: np.ndarray) -> Motion:
-    return moving(t, np.zeros((len(t), 3)))
-
-
-def gripper(closes: float, opens: float):
-    t = np.arange(0, 9, 0.02)
-    return t, np.where((t >= closes) & (t < opens), 0.016, 0.08)
-
-
-def test_grasp_is_when_the_fingers_have_closed_for_good() -> None:
-    t, opening = gripper(1.0, 7.53)
-    assert find_grasp((t, opening), resting(t), 7.5) == pytest.approx(1.0)
-    t, opening = gripper(1.5, 7.53)
-    opening[(t > 0.5) & (t < 0.8)] = 0.016
-    assert find_grasp((t, opening), resting(t), 7.5) == pytest.approx(1.5, abs=0.021)
-
-
-def lifted(t: np.ndarray, at: float) -> np.ndarray:
+def lifted(at: float) -> Motion:
     """Down to the band from 10 cm above, and from `at` on up at 0.2 m/s for a second."""
-    down = 0.1 * np.clip(0.5 - t, 0, 0.5)
-    return np.stack([0 * t, 0 * t, down + 0.2 * np.clip(t - at, 0, 1)], axis=1)
-
-
-def test_without_a_gripper_the_lift_tells() -> None:
     t = np.arange(0, 9, 0.01)
-    assert find_grasp(None, moving(t, lifted(t, 1.0)), 7.5) == pytest.approx(1.03, abs=0.02)
-    with pytest.raises(UserError, match="no grasp"):
-        find_grasp(None, resting(t), 7.5)
+    up = 0.1 * np.clip(0.5 - t, 0, 0.5) + 0.2 * np.clip(t - at, 0, 1)
+    return resting(t, up[:, None] * [0, 0, 1])
 
 
-def test_a_gripper_topic_that_comes_late_does_not_move_the_grasp_into_the_lift() -> None:
-    t = np.arange(0, 9, 0.01)
-    late = gripper(1.3, 7.83)  # by 0.3 s, while the hand lifts from 1.02 s on
-    assert find_grasp(late, moving(t, lifted(t, 1.02)), 7.5) == pytest.approx(1.02, abs=0.03)
+def gripper(closes: float, opens: float, begins: float = 0.0, once: float = 9.0):
+    """Times, and openings that are closed once before for 0.3 s."""
+    t = np.arange(begins, 9, 0.02)
+    closed = ((t >= closes) & (t < opens)) | ((t > once) & (t < once + 0.3))
+    return t, np.where(closed, 0.016, 0.08)
 
 
-def test_a_gripper_topic_that_starts_after_the_grasp_leaves_it_to_the_lift() -> None:
-    t, opening = gripper(0.0, 7.53)
-    seen = t > 3
-    hand = moving(t, lifted(t, 1.0))
-    assert find_grasp((t[seen], opening[seen]), hand, 7.5) == pytest.approx(1.03, abs=0.03)
+STILL = resting(np.arange(0, 9, 0.02))
 
 
-def test_a_band_that_slips_out_is_noticed() -> None:
-    t, opening = gripper(1.0, 99.0)
-    with pytest.raises(UserError, match="stays closed"):
-        find_grasp((t, opening), resting(t), 7.5)
+@pytest.mark.parametrize(
+    ("fingers", "motion", "grasp"),
+    [
+        (gripper(1.0, 7.53), STILL, 1.0),
+        (gripper(1.5, 7.53, once=0.5), STILL, 1.5),
+        (None, lifted(1.0), 1.03),
+        (gripper(1.3, 7.83), lifted(1.02), 1.02),  # late by 0.3 s: not into the lift
+        (gripper(0.0, 7.53, begins=3.0), lifted(1.0), 1.03),  # begins after the grasp
+        (None, STILL, "no grasp"),
+        (gripper(1.0, 99.0), STILL, "stays closed"),
+    ],
+)
+def test_the_grasp_by_the_fingers_or_by_the_lift(fingers, motion, grasp) -> None:
+    if isinstance(grasp, str):
+        with pytest.raises(UserError, match=grasp):
+            find_grasp(fingers, motion, 7.5)
+    else:
+        assert find_grasp(fingers, motion, 7.5) == pytest.approx(grasp, abs=0.03)
 
 
 UNITS = {"m": 0.08, "mm": 80.0, "percent": 100.0, "knuckle": -0.8, "steps": -255.0}
@@ -187,11 +179,11 @@ def test_grasp_by_a_gripper_of_any_sign_and_unit(unit, lead) -> None:
     times = np.arange(0, 9, 0.02)
     open_ = np.interp(times, [lead, lead + 0.1, 1.2, 1.4, 7.5, 7.7], [lead == 0, 1, 1, 0.1, 0.1, 1])
     noise = np.random.default_rng(4).normal(0, 1e-3, len(times))
-    gripper = times, UNITS[unit] * (open_ + noise) + (0.8 if UNITS[unit] < 0 else 0)
-    release = find_release(t, force, gripper).time
-    assert find_grasp(gripper, resting(t), release) == pytest.approx(1.38, abs=0.05)
-    assert find_releases(t, force, gripper) == pytest.approx([7.5], abs=0.01)
-    slipped = times, np.where(times > 7, gripper[1][340] - 0.05 * UNITS[unit], gripper[1])
+    fingers = times, UNITS[unit] * (open_ + noise) + (0.8 if UNITS[unit] < 0 else 0)
+    release = find_release(t, force, fingers).time
+    assert find_grasp(fingers, resting(t), release) == pytest.approx(1.38, abs=0.05)
+    assert find_releases(t, force, fingers) == pytest.approx([7.5], abs=0.01)
+    slipped = times, np.where(times > 7, fingers[1][340] - 0.05 * UNITS[unit], fingers[1])
     with pytest.raises(UserError, match="the gripper stays closed"):
         find_grasp(slipped, resting(t), release)
 

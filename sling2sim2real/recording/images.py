@@ -47,15 +47,15 @@ def unpacked(data: np.ndarray, kind: str) -> np.ndarray:
     """
     try:
         with Image.open(io.BytesIO(data.data), formats=FORMATS) as image:
-            cut = image.format == "JPEG" and JPEG_END not in data.tobytes()  # grey would fill it up
+            if image.format == "JPEG" and JPEG_END not in data.tobytes():  # grey would fill it up
+                raise Undecodable(f"{kind}: JPEG is cut off")
             pixels = image.convert("L") if image.mode == "1" else image
-            array = np.asarray(pixels if pixels.mode in GREY else pixels.convert("RGB"))
+            return np.asarray(pixels if pixels.mode in GREY else pixels.convert("RGB"))
+    except Undecodable:
+        raise
     except Exception as error:  # damaged bytes make Pillow raise anything
         name = type(error).__name__  # its words hold addresses, which differ from run to run
         raise Undecodable(f"{kind}: damaged image, or neither {KNOWN} ({name})") from error
-    if cut:
-        raise Undecodable(f"{kind}: the JPEG is cut off")
-    return array
 
 
 def color(picture: Picture) -> np.ndarray:

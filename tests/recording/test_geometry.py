@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import yourdfpy
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -256,6 +255,7 @@ def matrices(poses: np.ndarray) -> np.ndarray:
 
 
 def test_every_kind_of_joint_as_yourdfpy_has_it(folder) -> None:
+    yourdfpy = pytest.importorskip("yourdfpy")
     file = folder / "mixed.urdf"
     file.write_text(MIXED)
     chain = chain_of("mixed.urdf")
@@ -266,6 +266,43 @@ def test_every_kind_of_joint_as_yourdfpy_has_it(folder) -> None:
     for row, ours in zip(positions, matrices(chain.poses(positions)), strict=True):
         other.update_cfg(dict(zip(chain.names, row, strict=True)))
         np.testing.assert_allclose(ours, other.get_transform("my_tcp", "world"), atol=1e-12)
+
+
+# a, d, alpha, of Craig's convention: frankarobotics.github.io/docs/control_parameters.html
+PANDA = [
+    (0, 0.333, 0),
+    (0, 0, -np.pi / 2),
+    (0, 0.316, np.pi / 2),
+    (0.0825, 0, np.pi / 2),
+    (-0.0825, 0.384, -np.pi / 2),
+    (0, 0, np.pi / 2),
+    (0.088, 0, np.pi / 2),
+]
+
+
+def test_a_panda_as_its_table_has_it(folder) -> None:
+    joints = []
+    for i, (a, d, alpha) in enumerate(PANDA, 1):
+        y, z = -d * np.sin(alpha), d * np.cos(alpha)
+        joints.append(
+            f'<joint name="panda_joint{i}" type="revolute"><parent link="l{i - 1}"/>'
+            f'<child link="l{i}"/><origin xyz="{a} {y} {z}" rpy="{alpha} 0 0"/>'
+            '<axis xyz="0 0 1"/></joint>'
+        )
+    (folder / "panda.urdf").write_text(f'<robot name="p">{"".join(joints)}</robot>')
+    chain = chain_of("panda.urdf", "l7")
+    angles = np.random.default_rng(1).uniform(-2.5, 2.5, (30, 7))
+    for row, ours in zip(angles, matrices(chain.poses(angles)), strict=True):
+        expected = np.eye(4)
+        for (a, d, alpha), q in zip(PANDA, row, strict=True):
+            c, s, ca, sa = np.cos(q), np.sin(q), np.cos(alpha), np.sin(alpha)
+            expected = expected @ [
+                [c, -s, 0, a],
+                [s * ca, c * ca, -sa, -d * sa],
+                [s * sa, c * sa, ca, d * ca],
+                [0, 0, 0, 1],
+            ]
+        np.testing.assert_allclose(ours, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(

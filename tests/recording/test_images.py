@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 from dataclasses import replace
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -13,9 +12,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.camera import Camera, camera_from
+from sling2sim2real.recording.camera import Calibration, Camera, camera_from
 from sling2sim2real.recording.images import Undecodable, color, depth
-from sling2sim2real.recording.messages import Picture, read_calibration
+from sling2sim2real.recording.messages import Picture
 from tests.recording.conftest import whole_of
 from tests.recording.made import of_pictures
 from validation.recordings.bag import Lens, write_bag
@@ -95,21 +94,16 @@ def test_packed_depths(picture) -> None:
     np.testing.assert_allclose(depth(picture), MILLIMETRES / 1000, rtol=1e-6)
 
 
-def quantised(metres: np.ndarray) -> tuple[bytes, np.ndarray]:
-    """Header and inverse depth with depth_max 10 m, depth_quantization 100 (image_transport)."""
+def test_quantised_depth_as_image_transport_writes_it() -> None:
+    """Inverse depth with depth_max 10 m and depth_quantization 100, behind a header."""
     a = 100 * 101.0
     b = 1 - a / 10
-    return struct.pack("<iff", 0, a, b), np.where(metres > 0, np.round(a / metres + b), 0)
-
-
-def test_quantised_depth_as_image_transport_writes_it() -> None:
-    metres = DEPTH.copy()
-    metres[2, 3] = 0
-    header, inverse = quantised(np.where(metres > 0, metres, np.inf))
+    inverse = np.round(a / DEPTH + b).astype(np.uint16)
     inverse[2, 3] = 0
-    inverse = inverse.astype(np.uint16)
-    result = depth(packed("32FC1; compressedDepth png", header + png(inverse)))
-    np.testing.assert_allclose(result, metres, rtol=2e-4)
+    result = depth(
+        packed("32FC1; compressedDepth png", struct.pack("<iff", 0, a, b) + png(inverse))
+    )
+    np.testing.assert_allclose(result, np.where(inverse > 0, DEPTH, 0), rtol=2e-4)
 
 
 JPEG = cv2.imencode(".jpg", np.full((64, 64, 3), 90, np.uint8))[1].tobytes()
@@ -129,9 +123,7 @@ WHOLE = raw("rgb8", BGR)
         (depth, packed("16UC1; compressedDepth png", bytes(12) + png(BGR[..., 0])), "uint8"),
         (depth, packed("png", png(BGR)), "or in colour"),
         (depth, packed("16UC1; compressedDepth rvl", bytes(99)), "rvl: damaged image, or neither"),
-        (depth, raw("8UC1", BGR[..., 0]), "'8UC1' is no depth, use 16UC1"),
         (depth, raw("16SC1", MILLIMETRES.astype(np.int16)), "'16SC1' is no depth, use 16UC1"),
-        (depth, raw("64FC1", DEPTH.astype(float)), "'64FC1' is no depth, use 16UC1"),
         (color, raw("mono16", MILLIMETRES), "'mono16' is no known colour, use rgb8"),
         (color, packed("jpeg", b""), "damaged"),
         (color, packed("jpeg", JPEG[:-2]), "cut off"),
@@ -141,7 +133,6 @@ WHOLE = raw("rgb8", BGR)
             packed("jpeg", JPEG[:SIZE] + struct.pack(">HH", 65500, 65500) + JPEG[SIZE + 4 :]),
             "Bomb",
         ),
-        (depth, packed("16UC1; compressedDepth png", b"short"), "damaged"),
         (color, replace(WHOLE, content=WHOLE.data[:-1]), "6 rows of 15 bytes, in 89"),
         (color, replace(WHOLE, step=14), "5 x 6 pixels of rgb8 cannot be 6 rows of 14 bytes"),
         (color, replace(WHOLE, height=2**31, width=2**31, step=2**33), "2147483648 x"),
@@ -176,27 +167,17 @@ K = np.array([[60.0, 0, 31.5], [0, 62.0, 23.5], [0, 0, 1]])
 PLUMB_BOB = [0.1, -0.05, 0.001, -0.002, 0.01]
 RATIONAL = [0.3, 0.1, 0.001, -0.001, 0.02, 0.25, 0.08, 0.01]
 THIN_PRISM = [*RATIONAL, 0.002, -0.001, 0.001, 0.0005]
+RECTIFIED = np.array([[50.0, 0, 30], [0, 50, 20], [0, 0, 1]])
 POINTS = np.random.default_rng(0).uniform([-0.4, -0.3, 0.8], [0.4, 0.3, 1.5], (50, 3))
 
 
-def info(matrix=K, distortion=(), model="plumb_bob", **more: object) -> SimpleNamespace:
-    projection = np.hstack([np.asarray(matrix), np.zeros((3, 1))])
-    return SimpleNamespace(
-        header=SimpleNamespace(stamp=SimpleNamespace(sec=1, nanosec=2), frame_id="optical"),
-        **{
-            "width": 64,
-            "height": 48,
-            "k": list(np.ravel(matrix)),
-            "d": list(distortion),
-            "p": list(projection.ravel()),
-            "distortion_model": model,
-            **more,
-        },
-    )
-
-
-def camera(message, image="/camera/image", size=(64, 48)) -> Camera:
-    return camera_from("/camera/info", read_calibration(message).value, image, size)
+def camera(
+    matrix=K, distortion=(), model="plumb_bob", size=(64, 48), image="/camera/image"
+) -> Camera:
+    """Of images of 64 x 48 pixels; rectified ones have another matrix."""
+    camera = Camera(*size, np.asarray(matrix), np.array(distortion, float), "optical")
+    calibration = Calibration(camera, model, RECTIFIED)
+    return camera_from("/camera/info", calibration, image, (64, 48))
 
 
 def distorted(points: np.ndarray, d: list[float]) -> np.ndarray:
@@ -224,7 +205,7 @@ def distorted(points: np.ndarray, d: list[float]) -> np.ndarray:
     ],
 )
 def test_pinholes(model, distortion) -> None:
-    result = camera(info(distortion=distortion, model=model))
+    result = camera(distortion=distortion, model=model)
     expected = distorted(POINTS, distortion[:12])
     np.testing.assert_allclose(result.project(POINTS), expected, atol=1e-9)
     assert_rays_lead_back(result)
@@ -237,35 +218,35 @@ def assert_rays_lead_back(model: Camera) -> None:
     np.testing.assert_allclose(model.project(points), expected, atol=1e-4)
 
 
-def test_rectified_images_have_the_camera_p() -> None:
-    p = [50.0, 0, 30, 0, 0, 50, 20, 0, 0, 0, 1, 0]
-    message = info(distortion=PLUMB_BOB, p=p)
-    result = camera(message, image="/camera/image_rect_color/compressed")
-    np.testing.assert_array_equal(result.matrix, [[50, 0, 30], [0, 50, 20], [0, 0, 1]])
-    assert not len(result.distortion)
-    assert camera(message, image="/camera/rectified").matrix[0, 0] == 50
-    for image in ("/camera/image_raw", "/direct/correct_image"):
-        assert camera(message, image=image).matrix[0, 0] == 60
+@pytest.mark.parametrize(
+    ("image", "focal"),
+    [
+        ("/camera/image_rect_color/compressed", 50),
+        ("/camera/rectified", 50),
+        ("/camera/image_raw", 60),
+        ("/direct/correct_image", 60),
+    ],
+)
+def test_rectified_images_have_the_camera_p(image, focal) -> None:
+    result = camera(distortion=PLUMB_BOB, image=image)
+    np.testing.assert_array_equal(result.matrix, RECTIFIED if focal == 50 else K)
+    assert len(result.distortion) == (0 if focal == 50 else 5)
 
 
 @pytest.mark.parametrize(
-    ("message", "size", "words"),
+    ("given", "words"),
     [
-        (info(np.zeros((3, 3))), (64, 48), "not calibrated"),
-        (info(np.full((3, 3), np.nan)), (64, 48), "not calibrated"),
-        (info(distortion=[0.1] * 4, model="equidistant"), (64, 48), "model 'equidistant'.*rectif"),
-        (info(distortion=[0.1] * 6), (64, 48), "with 6 coefficients"),
-        (
-            info(),
-            (32, 24),
-            "images of /camera/image are 32 x 24 pixels, /camera/info is of 64 x 48",
-        ),
-        (info(width=2**31, height=2**31), (64, 48), "2147483648 x 2147483648"),
+        ({"matrix": np.zeros((3, 3))}, "not calibrated"),
+        ({"matrix": np.full((3, 3), np.nan)}, "not calibrated"),
+        ({"distortion": [0.1] * 4, "model": "equidistant"}, "model 'equidistant'.*rectif"),
+        ({"distortion": [0.1] * 6}, "with 6 coefficients"),
+        ({"size": (32, 24)}, "/camera/image are 64 x 48 pixels, /camera/info is of 32 x 24"),
+        ({"size": (2**31, 2**31)}, "2147483648 x 2147483648"),
     ],
 )
-def test_calibrations_that_do_not_fit(message, size, words) -> None:
+def test_calibrations_that_do_not_fit(given, words) -> None:
     with pytest.raises(UserError, match=words) as caught:
-        camera(message, size=size)
+        camera(**given)
     assert "\n" not in str(caught.value)
 
 

@@ -9,16 +9,15 @@ import numpy as np
 import open3d
 import pytest
 
-from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording import clouds as cloud
 from sling2sim2real.recording.clouds import by_phase, over_time, share_covered, share_off_plane
-from tests.project import DEFAULTS
+from sling2sim2real.settings.recording import CloudParams
 from tests.recording.made import of_pictures
 from validation.recordings import looks
 from validation.recordings.looks import BAND, LOOKS
 
-SETTINGS = load(DEFAULTS).cloud
+SETTINGS = CloudParams()
 
 
 def tube(count: int, random: np.random.Generator) -> np.ndarray:

@@ -13,7 +13,6 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording.build import Processed, build_episodes, episode_of, process
 from sling2sim2real.recording.clouds import clouds_of, masker
@@ -21,7 +20,8 @@ from sling2sim2real.recording.mask import Colors, RidgeMask, Shape
 from sling2sim2real.recording.scene import View
 from sling2sim2real.recording.streams import read_recording
 from sling2sim2real.recording.transforms import Transform
-from tests.project import DEFAULTS, with_
+from sling2sim2real.settings.recording import CloudParams
+from tests.project import with_
 from tests.recording.conftest import part_of, processed_of, whole_of
 from tests.recording.parts import joined
 from validation.recordings import looks
@@ -35,7 +35,7 @@ THIN, APART = "4 mm thin, white, white arm", "orange, colour camera apart"
 
 @pytest.fixture(scope="module")
 def cloud():
-    return load(DEFAULTS).cloud
+    return CloudParams()
 
 
 @pytest.mark.parametrize(

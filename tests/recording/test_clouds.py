@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,6 +13,8 @@ import pytest
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording import clouds as cloud
 from sling2sim2real.recording.clouds import by_phase, over_time, share_covered, share_off_plane
+from sling2sim2real.recording.images import depth
+from sling2sim2real.recording.messages import Picture
 from sling2sim2real.settings.recording import CloudParams
 from tests.recording.made import of_pictures
 from validation.recordings import looks
@@ -93,6 +96,33 @@ def test_a_recording_in_which_no_band_is_seen_is_refused(monkeypatch) -> None:
     monkeypatch.setattr(cloud, "masker", lambda *given: nothing)
     with pytest.raises(UserError, match="not found in 4 of 4 frames"):
         cloud.clouds_of(view, SETTINGS)
+
+
+@pytest.mark.parametrize(
+    ("factor", "kind", "swapped", "words"),
+    [
+        (10, np.uint16, False, "about 9.9 times"),
+        (3, np.uint16, False, "about 3 times"),
+        (0.1, np.uint16, False, "about 0.098 times"),
+        (1, np.float32, False, "about 990 times"),
+        (1, np.uint16, True, "of the byte order"),
+        (0.001, np.float32, True, "of the byte order"),
+        (1, np.uint16, False, ""),
+        (0.001, np.float32, False, ""),
+    ],
+)
+def test_depth_of_another_unit_or_order_is_named(factor, kind, swapped, words) -> None:
+    """As a driver would send it, of depth in millimetres."""
+    view, _ = looks.view_of(LOOKS["orange on grey, white arm"], looks.times(6))
+    encoding, values = {np.uint16: "16UC1", np.float32: "32FC1"}[kind], []
+    for picture in view.recording.depth.values:
+        sent = (np.round(1000 * depth(picture)) * factor).astype(np.dtype(kind).newbyteorder("<"))
+        size = *sent.shape, sent.strides[0]
+        values.append(Picture(encoding, "", sent.view(np.uint8).ravel(), *size, swapped))
+    depths = replace(view.recording.depth, values=values)
+    view.recording = replace(view.recording, depth=depths)
+    with pytest.raises(UserError, match=words) if words else nullcontext():
+        assert cloud.clouds_of(view, SETTINGS).empty == 0
 
 
 def test_colours_of_a_camera_apart_belong_to_their_points() -> None:

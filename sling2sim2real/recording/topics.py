@@ -393,9 +393,7 @@ def opening_of(values: np.ndarray, topic: str, names: tuple[str, ...]) -> np.nda
 def _arm(topic: Topic, setup: SetupParams) -> Choice:
     """Joint states through params' URDF."""
     names = [name for name in _joint_names(topic) if not _is_finger(name)]
-    if not names:
-        raise UserError(f"{topic.name} has the joints of fingers alone")
-    has = few(names, SHOWN)
+    has = few(names, SHOWN) or "of fingers alone"
     if setup.urdf is None:
         raise UserError(
             f"{topic.name} has the joints {has}: put the robot's URDF into robots/ and name it in"

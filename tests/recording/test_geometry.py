@@ -309,9 +309,9 @@ def test_a_panda_as_its_table_has_it(folder) -> None:
     ("text", "tip", "words"),
     [
         (None, None, "cannot be read"),
-        ("<robot", None, "not valid XML"),
+        ("<robot", None, "cannot be read"),
         ("<robot/>", None, "no robot with joints"),
-        ('<robot xmlns:xacro="http://ros.org/xacro"><xacro:a/></robot>', None, "is a xacro"),
+        ('<robot xmlns:xacro="http://ros.org/xacro"><xacro:a/></robot>', None, "expand a xacro"),
         (MIXED, "claw", "no link 'claw'"),
         (MIXED.replace("my_tcp", "claw"), None, "setup.tip_link: name the link"),
         (MIXED.replace('<axis xyz="0 0 1"/>', '<mimic joint="one"/>'), None, "three is mimic"),

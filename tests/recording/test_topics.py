@@ -480,7 +480,7 @@ def test_arm_and_gripper_that_share_a_topic(params, gantry) -> None:
     [
         (joints("/js", ["j1", "j2"], PLACES[:, :2]), {}, "joints j1, j2: put the robot's URDF"),
         (joints("/js", ["x", "y"], PLACES[:, :2]), GANTRY_URDF, "/js lacks joint z, rz, ry, rx of"),
-        (joints("/js", ["finger"], PLACES[:, :1]), {}, "/js has the joints of fingers alone"),
+        (joints("/js", ["finger"], PLACES[:, :1]), {}, "/js has the joints of fingers alone: put"),
         (joints("/js", ["x"], PLACES[:, :1]), {"urdf": "no.urdf"}, "no.urdf: cannot be read"),
     ],
 )

@@ -21,7 +21,6 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.stats import median_abs_deviation
 
 from sling2sim2real.base.errors import UserError, printable
 from sling2sim2real.recording import images, pace
@@ -453,7 +452,8 @@ def drift_of(
     means = np.array([part.mean() for part in np.array_split(1e-9 * lead, PARTS)])
     first, last = sorted([int(means.argmin()), int(means.argmax())])
     # Neither a drift nor a step changes the median deviation of first differences much.
-    scatter = median_abs_deviation(np.diff(1e-9 * lead), scale="normal") / np.sqrt(2)
+    steps = np.diff(1e-9 * lead)
+    scatter = 1.4826 * np.median(np.abs(steps - np.median(steps))) / np.sqrt(2)
     return float(means[last] - means[first]), float(scatter * np.sqrt(2 * PARTS / len(lead)))
 
 

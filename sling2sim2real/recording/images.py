@@ -13,7 +13,7 @@ from sling2sim2real.recording.messages import Picture
 
 FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "BMP", "JPEG2000", "AVIF")
 KNOWN = "JPEG, PNG, WebP, TIFF, BMP, JPEG 2000 or AVIF"
-JPEG_END = b"\xff\xd9"  # behind it is what a driver sends of its buffer
+JPEG, JPEG_END = b"\xff\xd8\xff", b"\xff\xd9"  # behind it is what a driver sends of its buffer
 GREY = ("L", "I;16", "I", "F")  # modes of Pillow that are kept as they are
 LARGEST = 2**24  # pixels of a raw picture; a damaged size must not ask for more
 # compressed_depth_image_transport: format, depth quantisation A and B
@@ -83,6 +83,8 @@ def depth(picture: Picture) -> np.ndarray:
             raise Undecodable(f"encoding {picture.encoding!r} is no depth, {USE}")
         return _metres(_rows(picture, DEPTHS[picture.encoding], 1))
     data, floats = picture.data, picture.format.startswith("32FC1")
+    if data.tobytes().startswith(JPEG):
+        raise Undecodable(f"{picture.format}: a JPEG is no depth, {USE}")
     # Some writers leave the header out.
     headed = "compressedDepth" in picture.format and not data.tobytes().startswith(PNG)
     if floats and not headed:

@@ -457,7 +457,7 @@ def assert_same_episode(episode: Episode, usual: Episode) -> None:
         np.testing.assert_allclose(ours, theirs, atol=1e-6)
 
 
-CONTAINERS = {
+FOXGLOVE = {
     "zstd": {"compression": foxglove.mcap.MCAPCompression.Zstd},
     "lz4": {"compression": foxglove.mcap.MCAPCompression.Lz4},
     "none": {"compression": None},
@@ -473,10 +473,10 @@ CONTAINERS = {
 }
 
 
-@pytest.mark.parametrize("container", CONTAINERS)
+@pytest.mark.parametrize("container", FOXGLOVE)
 def test_every_container(container, blind, params, tmp_path) -> None:
     path = tmp_path / "other.mcap"
-    translate(blind[0], path, "protobuf", **CONTAINERS[container])
+    translate(blind[0], path, "protobuf", **FOXGLOVE[container])
     assert_same_recording(*(read_recording(file, params.setup) for file in (path, blind[0])))
 
 

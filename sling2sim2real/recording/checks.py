@@ -142,9 +142,9 @@ TABLE = (
     Check("delay",
         "the stamps of pose and camera with the force's, by what the recording shows",
         "the estimates' standard errors; what nothing shows the fit leaves open",
-        f"{1e3 * SMALL:g} ms and {SURE:g} standard errors, taken out where confirmed; the pose's is"
-        f" not known to {1e3 * OPEN:g} ms; or two estimates disagree",
-        "",
+        f"{1e3 * SMALL:g} ms and {SURE:g} standard errors, which are taken out; the pose's is not"
+        f" known to {1e3 * OPEN:g} ms; or two estimates disagree",
+        "only the hand that starts back shows the pose's, or its tool's inertia contradicts it",
         "record the force from the robot's own clock, or set episode.delays in params.yaml"),
     Check("release_pictures",
         "the last picture of the drawn band and the next one with the fall of the force, and each"
@@ -433,6 +433,15 @@ def _of_frames(frame: str, geometry: Geometry, transforms) -> Iterator[Finding]:
 
 def _of_delays(delays: Delays) -> Iterator[Finding]:
     """Of pose and camera, beside what was given of them, and what the release's pictures show."""
+    if delays.pose.alone:
+        value = delays.pose.value
+        what = delays.conflict or (
+            f"the hand starts back {1e3 * value:+.1f} ms from when the force falls: the stamps of"
+            " the pose are late or early by that, or the robot moves by itself"
+        )
+        cure = f"set episode.delays.pose in params.yaml: {value:.4f}, or 0 for its own motion"
+        yield found("delay", what, cure, refused=True)
+        return
     for role, delay in (("pose", delays.pose), ("camera", delays.camera)):
         error, late = delay.error or 0.0, delay.value - (delay.given or 0.0)
         if abs(late) <= max(SMALL, SURE * error):
@@ -446,12 +455,9 @@ def _of_delays(delays: Delays) -> Iterator[Finding]:
             what += f" beside the {delay.given:g} s that episode.delays.{role} says"
             cure = f"set it to {delay.value:.4f}, or to null"
         what += f", which is {'taken out' if delay.applied else 'not taken out'}"
-        if delay.alone:
-            what += "; only the hand that starts back shows it, as a robot's own motion would"
-            cure = f"set episode.delays.{role} to what it is (0 where it is the robot's own motion)"
         yield found("delay", what, cure)
     left = delays.pose.left or 0.0
-    if left > OPEN and not (delays.pose.alone or delays.conflict):
+    if left > OPEN:
         what = (
             f"the pose's clock against the force's is not known better than ± {1e3 * left:.1f} ms"
         )

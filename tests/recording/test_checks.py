@@ -126,6 +126,10 @@ def test_delays_that_the_recording_shows_are_said(checked, params) -> None:
     for left, message in ((0.003, True), (0.001, False), (None, False)):
         odd = replace(checked, delays=replace(checked.delays, pose=Estimate(left=left)))
         assert ("delay" in abouts(of_signals(odd, params))) == message
+    alone = Estimate(0.012, 0.001, "estimated", left=0.012, alone=True)
+    odd = replace(checked, delays=replace(checked.delays, pose=alone))
+    (refused,) = (finding for finding in of_signals(odd, params) if finding.refused)
+    assert "the robot moves by itself" in refused.what and "pose in params" in refused.cure
     odd = replace(checked, delays=replace(checked.delays, conflict="one says 3 ms, one -9 ms"))
     assert "one says 3 ms, one -9 ms" in [finding.what for finding in of_signals(odd, params)]
 

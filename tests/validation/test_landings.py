@@ -11,37 +11,12 @@ from rig.physics.launch import Trial
 from validation.campaigns import rig_scores
 from validation.campaigns.landings import (
     FIRST,
-    SETS,
     OneRecording,
     figures,
-    jobs,
 )
 from validation.campaigns.rig_scores import TARGETS
-from validation.campaigns.runner import POSTERIOR
 from validation.projects import DEFAULTS
 from validation.rubbers import DEVELOP, SEALED, UNSEEN_LAWS, rubbers
-
-
-def test_each_band_is_recorded_by_both_pulls_and_once_after_it_was_drawn() -> None:
-    for name, (seed, bands, count, states) in SETS.items():
-        every = jobs(name)
-        assert len(set(every)) == len(every) and {job.seed for job in every} == {seed}
-        other = [job for job in every if job.launched or job.method != POSTERIOR]
-        assert {job.kind for job in other} == {
-            "paper, virgin, the paper's method",
-            "informative, virgin, the paper's method",
-            "informative, virgin, one launch",
-        }
-        assert len(other) == 3 * len(bands) and {job.number for job in other} == {0}
-        every = [job for job in every if job not in other]
-        virgin = [job for job in every if not job.worn]
-        assert len(virgin) == 2 * count * len(bands)
-        assert len(every) - len(virgin) == 2 * len(bands) * (True in states)
-    job = OneRecording(DEVELOP, "develop1", "informative", True, 0)
-    assert (
-        job.params.rig.recordings["plain"].pull == "informative"
-        and job.params.bands["develop1"].preconditioned
-    )
 
 
 def test_half_of_the_sealed_rubbers_soften_by_laws_that_none_was_developed_on() -> None:

@@ -94,11 +94,3 @@ def test_survives_the_file(tmp_path) -> None:
     np.testing.assert_array_equal(loaded(draws).landing_y, chart(draws).landing_y)
     np.testing.assert_array_equal(loaded(draws).failure, chart(draws).failure)
     assert validation(loaded, (1.4, 2.4)) == validation(chart, (1.4, 2.4))
-
-
-def test_a_box_in_which_every_launch_fails() -> None:
-    chart = simulate(broken_beyond(-np.inf))
-    landed = chart(random_draws(20))
-    assert {chart.surface.reasons[code] for code in landed.failure} == {"it broke"}
-    nothing = {"draws": 0, "mean_error_m": None, "max_error_m": None}
-    assert validation(chart, (1.4, 2.4))["box"] == nothing

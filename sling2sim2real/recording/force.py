@@ -166,7 +166,8 @@ class Drift:
         rate: Of a steady drift, that is to be taken out (3,) [N/s]; 0 where it is not steady.
         change: From the lead-in to the free hand at the end (3,) [N]; None where that says nothing.
         error: Standard deviation of its length [N].
-        steady: Whether the course within both windows agrees with a steady drift.
+        steady: Whether the course within both windows agrees with a steady drift, and that within
+            one of them shows it.
     """
 
     rate: np.ndarray
@@ -203,7 +204,8 @@ def drift_of(
     other = any(
         abs(slope - speed) > max(SURE * spread, OTHER * speed) for slope, spread, _ in courses
     )
-    if size > max(MATTERS * drop, SURE * error) and other:
+    shown = any(SURE * spread < speed for _, spread, _ in courses)
+    if size > max(MATTERS * drop, SURE * error) and (other or not shown):
         return Drift(np.zeros(3), change, error, steady=False)
     return Drift(rate, change, error)
 
@@ -227,6 +229,7 @@ def course(t: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
 LONGEST = 0.1  # s of either sign
 SMOOTH = 0.2  # s in which errors of the smoothed force go together
 LEAST_LOAD = 8.0  # standard deviations by which the tool's mass must show
+LEAST_MASS = 0.01  # kg: what weighs less is no tool
 WINDOW = 0.15  # s of the fits by which the load changes
 STEP = 0.002  # s of the grid on which the load is tabulated
 ROUNDS = 8
@@ -301,7 +304,7 @@ def estimate_tool_inertia(pull: Pull, tool: Tool | None) -> ToolInertia | None:
         left = right - np.einsum("tic,i->tc", columns, [mass, product])
         errors = _noise(left, blocks, 2 + 3 * len(np.unique(late))) * np.sqrt(np.diag(inverse))
         delay = float(np.clip(delay + product / mass, -LONGEST, LONGEST))
-    if abs(delay) >= LONGEST or abs(mass) < LEAST_LOAD * errors[0]:
+    if abs(delay) >= LONGEST or abs(mass) < max(LEAST_MASS, LEAST_LOAD * errors[0]):
         return None
     mass, delay_error = float(mass), float(errors[1] / abs(mass))
     return ToolInertia(mass, float(errors[0]), delay, delay_error, tuple(center.tolist()))

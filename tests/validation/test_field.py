@@ -3,7 +3,8 @@
 import numpy as np
 
 from tests.recording.conftest import blind
-from validation.campaigns.field import FAULTS, is_right
+from validation.campaigns import field
+from validation.campaigns.field import CORRECT, FAULTS, SILENT, is_right
 from validation.recordings.streams import FORCE, POSE, Bag
 
 __all__ = ["blind"]
@@ -22,6 +23,13 @@ def test_a_value_is_right_within_its_limits_and_interval() -> None:
     assert not is_right(sound, summary(2.06e5, 2e-3))  # 3 %
     assert not is_right(sound, summary(2.02e5, 2e-3, width=0.005))  # sure of another value
     assert not is_right(sound, summary(2e5, 4e-3, width=0.9))
+
+
+def test_a_wrong_fit_that_did_not_settle_is_not_silent() -> None:
+    assert field.outcome_of(right=True, settled=False, found=False) == CORRECT
+    assert field.outcome_of(right=False, settled=False, found=False) == field.CAUTIONED
+    assert field.outcome_of(right=False, settled=True, found=True) == field.MISNAMED
+    assert field.outcome_of(right=False, settled=True, found=False) == SILENT
 
 
 def test_a_fault_changes_what_it_says(blind) -> None:

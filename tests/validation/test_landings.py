@@ -27,7 +27,7 @@ def test_half_of_the_sealed_rubbers_soften_by_laws_that_none_was_developed_on() 
     assert 2 * sum(rubber["softening"] is not None for _, rubber in sealed.values()) == len(sealed)
 
 
-JOB = vars(OneRecording(DEVELOP, "a", "paper", False, 0)) | {"settled": True}
+JOB = vars(OneRecording(DEVELOP, "a", "paper", 0)) | {"settled": True}
 
 
 def scores(error: float, miss: float) -> dict:

@@ -11,7 +11,6 @@ import re
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -315,12 +314,12 @@ def _with_policy(folder: BandFolder, found: Identification, steps: Steps) -> Ide
     with replacing_folder(folder.path / "training") as temporary:
         how = make_policy(
             temporary,
-            partial(_launched, found),
+            found.launches,
             settings,
             name,
             METHOD,
             content,
-            asked=partial(_asked, found),
+            history=found.launch_setup.history,
             progress=_Training(steps, settings.policy.iterations),
         )
         for source, target in (("policy.onnx", stored.network), ("card.json", stored.card_file)):
@@ -338,25 +337,6 @@ class _Training:
     def advance(self, count: int, *facts: str) -> None:
         self.done += count
         self.steps.inside(self.done / self.total)
-
-
-def _launched(found: Identification, draws: np.ndarray):
-    return found.launches(draws)
-
-
-def _asked(found: Identification, draw: np.ndarray) -> dict | None:
-    """How the hand must draw, and what a second more of pause moves the landing of a draw by."""
-    history = found.launch_setup.history
-    if history is None:
-        return None
-    launch = {"pull_time": history.pull_time, "pause": history.pause + 1}
-    longer = replace(found, settings=found.settings.changed(launch=launch))
-    moved = float(longer.launches(draw).landing_y[0] - found.launches(draw).landing_y[0])
-    return {
-        "pull_time_s": history.pull_time,
-        "pause_s": history.pause,
-        "second_more_m": moved if np.isfinite(moved) else None,
-    }
 
 
 def _card(folder: BandFolder, found: Identification, episodes: Sequence[Episode]) -> dict:

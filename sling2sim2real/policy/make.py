@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-
-import numpy as np
 
 from sling2sim2real.base.machine import kind
 from sling2sim2real.base.progress import Advancing
@@ -16,6 +13,7 @@ from sling2sim2real.policy.environment import projectile_start
 from sling2sim2real.policy.export import export
 from sling2sim2real.policy.train import train
 from sling2sim2real.settings import Settings
+from sling2sim2real.simulator.model import LaunchHistory
 
 
 def make_policy(
@@ -26,16 +24,16 @@ def make_policy(
     method: str,
     theta: dict,
     *,
-    asked: Callable[[np.ndarray], dict | None],
+    history: LaunchHistory | None,
     progress: Advancing | None = None,
 ) -> str:
-    """Write policy.onnx, card.json, map.parquet and training.parquet; return how it went.
+    """Write policy.onnx and card.json; return how it went.
 
     Args:
         folder: Of these files.
         launcher: Simulates draws (N, 2) [m] of the calibrated band.
         params, band, method, theta: As `policy.export.card` has them.
-        asked: What a launch from the middle target's draw (2,) [m] asks of the hand, for the card.
+        history: How the hand must draw the band, where its law remembers that.
         progress: Told of each iteration.
     """
     settings = params.policy
@@ -55,8 +53,6 @@ def make_policy(
     trained = train(surface, settings, progress, projectile=start)
     checked = check(trained.policy, launcher, params)
     training = figures(trained, checked, settings.landings)
-    landing_map.save(folder / "map.parquet", {"band": band, "method": method})
-    middle = trained.policy.draws(np.mean(settings.targets, keepdims=True))[0]
     export(
         trained,
         folder,
@@ -66,7 +62,7 @@ def make_policy(
         theta,
         training=training,
         landing_map=validation(landing_map, settings.targets),
-        launch=asked(middle),
+        history=history,
         device=kind(),
     )
     return verdict(training, checked.failures)

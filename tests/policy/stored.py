@@ -12,8 +12,8 @@ from sling2sim2real.policy.train import Policy
 from tests.policy import toy
 
 
-def write_stored(folder: Path) -> LandingMap:
-    """Write policy.onnx and card.json; the toy's landing map, on which they rest."""
+def write_stored(folder: Path) -> None:
+    """Write policy.onnx and card.json, by the toy's landing map."""
     chart = LandingMap.simulate(
         toy.launch, draw_y=toy.DRAW_Y, draw_z=toy.DRAW_Z, size=(9, 9), max_force=15.0
     )
@@ -26,4 +26,3 @@ def write_stored(folder: Path) -> LandingMap:
     torch.manual_seed(0)
     network = nn.Sequential(nn.Linear(1, 8), nn.ELU(), nn.Linear(8, 2))
     write_onnx(Policy(network, (1.425, 2.425), chart.surface), folder / "policy.onnx")
-    return chart

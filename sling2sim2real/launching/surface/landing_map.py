@@ -7,18 +7,13 @@ million launches in seconds, and the error of reading between is itself measured
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
-from sling2sim2real.base.files import read_table, replacing
 from sling2sim2real.launching.surface.response_surface import NO_FAILURE, Landings, ResponseSurface
 
 
@@ -117,49 +112,6 @@ class LandingMap:
         """What is read between the launches."""
         values = self.landing_y, self.hold_force, self.failure
         return ResponseSurface((self.draw_y, self.draw_z), *values, self.max_force)
-
-    def save(self, path: Path, header: dict | None = None) -> None:
-        """Write one row a launch: grid nodes first (y slowest), then the validation draws."""
-        y, z = np.meshgrid(self.draw_y, self.draw_z, indexing="ij")
-        kind = ["grid"] * y.size + ["validation"] * len(self.checks)
-        failure = [reason or None for reason in self.failure.ravel()]
-        columns = {
-            "kind": pa.array(kind, pa.string()),
-            "draw_y": np.append(y, self.checks[:, 0]),
-            "draw_z": np.append(z, self.checks[:, 1]),
-            "landing_y": np.append(self.landing_y, self.checks[:, 2]),
-            "hold_force": np.append(self.hold_force, self.checks[:, 3]),
-            "failure": pa.array(failure + [None] * len(self.checks), pa.string()),
-        }
-        content = {"max_force": self.max_force, **(header or {})}
-        metadata = {"landing_map": json.dumps(content, sort_keys=True)}
-        with replacing(path) as temporary:
-            pq.write_table(pa.table(columns).replace_schema_metadata(metadata), temporary)
-
-    @classmethod
-    def load(cls, path: Path) -> LandingMap:
-        """Read a map that `save` wrote. Raises FileNotFoundError."""
-        table = read_table(path)
-        header = json.loads(table.schema.metadata[b"landing_map"])
-        kind = np.array(table["kind"].to_pylist())
-        column = {
-            name: table[name].to_numpy() for name in ("draw_y", "draw_z", "landing_y", "hold_force")
-        }
-        grid, check = kind == "grid", kind == "validation"
-        draw_y, draw_z = (np.unique(column[name][grid]) for name in ("draw_y", "draw_z"))
-        shape = (len(draw_y), len(draw_z))
-        failure = np.array(
-            [reason or NO_FAILURE for reason in table["failure"].to_pylist()], object
-        )
-        return cls(
-            draw_y=draw_y,
-            draw_z=draw_z,
-            landing_y=column["landing_y"][grid].reshape(shape),
-            hold_force=column["hold_force"][grid].reshape(shape),
-            failure=failure[grid].reshape(shape),
-            max_force=header["max_force"],
-            checks=np.column_stack([values[check] for values in column.values()]),
-        )
 
 
 def validation(landing_map: LandingMap, targets: tuple[float, float]) -> dict:

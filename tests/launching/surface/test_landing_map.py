@@ -86,16 +86,6 @@ def test_validation_sees_an_error_of_the_map() -> None:
     assert shifted["box"]["mean_error_m"] == pytest.approx(0.05, abs=1e-4)
 
 
-def test_survives_the_file(tmp_path) -> None:
-    chart = simulate(max_force=12.0)
-    chart.save(tmp_path / "map.parquet", {"band": "toy"})
-    loaded = LandingMap.load(tmp_path / "map.parquet")
-    draws = random_draws()
-    np.testing.assert_array_equal(loaded(draws).landing_y, chart(draws).landing_y)
-    np.testing.assert_array_equal(loaded(draws).failure, chart(draws).failure)
-    assert validation(loaded, (1.4, 2.4)) == validation(chart, (1.4, 2.4))
-
-
 def test_a_box_in_which_every_launch_fails() -> None:
     chart = simulate(broken_beyond(-np.inf))
     landed = chart(random_draws(20))

@@ -274,9 +274,9 @@ def observe(arguments: argparse.Namespace) -> Done:
 )
 def export(arguments: argparse.Namespace) -> Done:
     from sling2sim2real.api.band_folder import BandFolder
-    from sling2sim2real.api.exporting import export
     from sling2sim2real.base.disk import expect_writable
     from sling2sim2real.cli.export import shown
+    from sling2sim2real.exporting.export import export
 
     found = found_of(arguments)
     folder = BandFolder.at(arguments.band)

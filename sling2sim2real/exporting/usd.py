@@ -26,11 +26,10 @@ from pathlib import Path
 
 import numpy as np
 
+from sling2sim2real.api.model import Model
 from sling2sim2real.base.files import write_json, write_text
 from sling2sim2real.base.imported import imported
-from sling2sim2real.exporting import values as export_values
-from sling2sim2real.exporting.band import CalibratedBand
-from sling2sim2real.exporting.card import ASKED, compared_row, readme
+from sling2sim2real.exporting.card import ASKED, FRAMES, compared_row, identified, readme
 from sling2sim2real.exporting.chain import SpringChain
 from sling2sim2real.exporting.match import DrawCompared, draws_of, within_limits
 from sling2sim2real.exporting.mesh import Tube
@@ -99,7 +98,7 @@ class UsdMatch:
         return within_limits(self.proof)
 
 
-def to_usd(model: CalibratedBand, folder: Path, _: int) -> dict:
+def to_usd(model: Model, folder: Path, _: int) -> dict:
     """<band>.usda, nodes.json, and README.md: what it is, and what it is not."""
     draws, ours = near_draws(model)
     tension, stretch = SpringChain.tension(model, draws, ours.hold_force)
@@ -117,18 +116,12 @@ def to_usd(model: CalibratedBand, folder: Path, _: int) -> dict:
     write_text(folder / name, text(band))
     write_json(folder / "nodes.json", nodes(band))
     left = on_paper * unit / tension - 1
-    content = {
-        "band": model.band.name,
-        "target": "usd",
-        "files": {
-            name: "the model",
-            "nodes.json": "where it hangs, and which nodes clamps and hand lead",
-            "README.md": "what it is, and what it is not",
-        },
-        "frames": export_values.FRAMES,
-        "sizes": export_values.sizes(model),
-        "law": model.parameters.law,
-        "values": export_values.values(model),
+    files = {
+        name: "the model",
+        "nodes.json": "where it hangs, and which nodes clamps and hand lead",
+        "README.md": "what it is, and what it is not",
+    }
+    content = identified(model, "usd", files) | {
         "replayed": done is not None,
         "matched": [
             {"name": "youngs_modulus", "value": rounded(band.young, 6), "unit": "Pa"},
@@ -158,14 +151,14 @@ def to_usd(model: CalibratedBand, folder: Path, _: int) -> dict:
     return content
 
 
-def near_draws(model: CalibratedBand) -> tuple[np.ndarray, Launches]:
+def near_draws(model: Model) -> tuple[np.ndarray, Launches]:
     """What `draws_of` gives, near policy.targets alone; all where that is too few."""
     (draws, ours), (near, far) = draws_of(model), model.settings.policy.targets
     good = (ours.landing_y > near / TARGET_MARGIN) & (ours.landing_y < far * TARGET_MARGIN)
     return (draws[good], ours[good]) if good.sum() > 2 else (draws, ours)
 
 
-def match_of(target: str) -> Callable[[CalibratedBand, UsdBand], UsdMatch | None] | None:
+def match_of(target: str) -> Callable[[Model, UsdBand], UsdMatch | None] | None:
     """What an installed package offers to match a target in its engine; None: nothing."""
     with suppress(ModuleNotFoundError):  # a light install lacks what the engine's side needs
         for entry in entry_points(group=ENTRY_POINTS, name=target):
@@ -176,7 +169,7 @@ def match_of(target: str) -> Callable[[CalibratedBand, UsdBand], UsdMatch | None
 def nodes(band: UsdBand) -> dict:
     """Numbers of the nodes that are led, and places (V, 3) [m] of the hanging band."""
     return {
-        "frame": export_values.FRAMES,
+        "frame": FRAMES,
         "ends": band.tube.ends.tolist(),
         "hand": band.tube.hand.tolist(),
         "hanging_m": np.round(band.tube.clamped.reshape(-1, 3), 9).tolist(),

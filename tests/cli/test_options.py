@@ -140,7 +140,7 @@ def echo(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("sling2sim2real.cli.fit.fit", fit)
     patch.setattr("sling2sim2real.cli.observe.fit", lambda folder: None)
     patch.setattr("sling2sim2real.cli.preflight.command.look_at", look_at)
-    patch.setattr("sling2sim2real.api.exporting.export", export)
+    patch.setattr("sling2sim2real.exporting.export.export", export)
     patch.setattr("sling2sim2real.cli.view.view", lambda *given: repr(given[1]))
 
 

@@ -49,8 +49,7 @@ def content(model: Model, done: Matched, target: str, files: dict[str, str]) -> 
     chain, history = done.chain, model.launch_setup.history
     times = history and {"pull_time_s": history.pull_time, "pause_s": history.pause}
     return identified(model, target, files) | {
-        "history": pull
-        and {"pull_time_s": rounded(pull.pull_time), "pause_s": rounded(pull.pause)},
+        "history": times,
         "matched": [
             {"name": name, "value": rounded(value, 6), "unit": MATCHED[name]}
             for name, value in chain.matched.items()

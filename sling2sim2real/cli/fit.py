@@ -96,7 +96,6 @@ def fit(
         found = _with_policy(folder, found, steps)
     steps.begin(CARD)
     card = _card(folder, found, episodes)
-    steps.finish()
     _forget(folder)
     return card | {"card": str(folder.card / "README.md")}
 
@@ -320,23 +319,11 @@ def _with_policy(folder: BandFolder, found: Identification, steps: Steps) -> Ide
             METHOD,
             content,
             history=found.launch_setup.history,
-            progress=_Training(steps, settings.policy.iterations),
         )
         for source, target in (("policy.onnx", stored.network), ("card.json", stored.card_file)):
             os.replace(temporary / source, target)  # the card last: it says that both are there
     steps.say(how)
     return replace(found, policy=stored)
-
-
-class _Training:
-    """Tells the bar of a training's iterations."""
-
-    def __init__(self, steps: Steps, total: int) -> None:
-        self.steps, self.total, self.done = steps, total, 0
-
-    def advance(self, count: int, *facts: str) -> None:
-        self.done += count
-        self.steps.inside(self.done / self.total)
 
 
 def _card(folder: BandFolder, found: Identification, episodes: Sequence[Episode]) -> dict:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sling2sim2real.base.machine import kind
-from sling2sim2real.base.progress import Advancing
+from sling2sim2real.base.progress import Progress
 from sling2sim2real.launching.surface.landing_map import LandingMap, Launcher, validation
 from sling2sim2real.launching.surface.simulated import SimulatedLandings
 from sling2sim2real.policy.check import check, figures, verdict
@@ -25,7 +25,7 @@ def make_policy(
     theta: dict,
     *,
     history: LaunchHistory | None,
-    progress: Advancing | None = None,
+    progress: Progress | None = None,
 ) -> str:
     """Write policy.onnx and card.json; return how it went.
 

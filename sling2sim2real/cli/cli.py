@@ -136,7 +136,7 @@ def setup(arguments: argparse.Namespace) -> Done:
     from sling2sim2real.cli import setup
 
     measured = {name: getattr(arguments, name) for name in kinds.MEASURED}
-    done = setup.set_up(setup.LabMeasures(**measured, topics=arguments.topic))
+    done = setup.set_up(measured | {"topics": arguments.topic})
     return kinds.shown(done, True) if arguments.json else setup.shown(done)
 
 

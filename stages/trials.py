@@ -32,7 +32,7 @@ from stages.start import pair_of_stage, run
 
 def main() -> None:
     params, pair = pair_of_stage()
-    band_params, fork_width = params.bands[pair.band], params.setup.fork_width
+    band_params = params.bands[pair.band]
     layout = Layout()
     theta = load_theta(layout.theta(pair), pair.band)
     samples = load_samples(layout.confidence(pair), parameters_of(theta))
@@ -48,10 +48,8 @@ def main() -> None:
 
     launcher = simulator(params, pair.band, theta, layout.clamps(pair))
     rows = trials.predicted(rows, launcher, samples, params)
-    sizes, places = (
-        (fork_width, band_params.rest_length),
-        np.insert(trials.draws_of(rows), 0, 0, axis=1),
-    )
+    sizes = params.setup.fork_width, band_params.rest_length
+    places = np.insert(trials.draws_of(rows), 0, 0, axis=1)
     table = trials.table(
         rows,
         stretch_of(places, *sizes),

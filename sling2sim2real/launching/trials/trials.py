@@ -142,11 +142,9 @@ def table(trials: Sequence[Trial], stretch: np.ndarray, **common: str | float) -
         stretch: Of each drawn band, shape (N,).
         common: What all have alike: band, method, recorded_stretch.
     """
-    whole = [
-        trial | {"stretch": each} | common for trial, each in zip(trials, stretch, strict=True)
-    ]
-    known = [
-        {name: cell for name, cell in trial.items() if not (np.isscalar(cell) and cell != cell)}
-        for trial in whole
-    ]
-    return pa.Table.from_pylist(known, schema=SCHEMA)
+    rows = []
+    for trial, each in zip(trials, stretch, strict=True):
+        cells = trial | {"stretch": each} | common
+        unknown = [name for name, cell in cells.items() if np.isscalar(cell) and cell != cell]
+        rows.append(cells | dict.fromkeys(unknown))
+    return pa.Table.from_pylist(rows, schema=SCHEMA)

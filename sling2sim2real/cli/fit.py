@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from tabulate import tabulate
 
 from sling2sim2real.api.arguments import USUAL
 from sling2sim2real.api.band_folder import SIZES, BandFile, BandFolder
@@ -365,35 +366,24 @@ def _forget(folder: BandFolder) -> None:
 
 
 def shown(card: dict) -> str:
-    """What a card says, on one screen."""
-    reasons = [f"  - {reason}" for reason in card["reasons"]]
-    lines = [f"{card['band']}: {card['verdict']}", *reasons, ""]
-    width = max(len(value["label"]) for value in card["values"])
-    lines += [f"  {value['label']:{width}}  {_value(value)}" for value in card["values"]]
-    lines += ["", "  target     draw (y, z)           lands at   90 % interval       force"]
-    lines += [_draw(draw) for draw in card["draws"]]
+    """What a card says, on one screen: verdict, draws, advice; values stand on the card."""
+    draws = [
+        {
+            "target [m]": f"{row['target_m']:.3f}",
+            "draw y, z [m]": f"{row['draw_y_m']:.4f}, {row['draw_z_m']:.4f}",
+            "lands at [m]": _number(row["predicted_landing_m"], ".3f", "fails in simulation"),
+            "90 % interval": " to ".join(_number(end, ".3f") for end in row["interval_90_m"] or []),
+            "force [N]": _number(row["hold_force_n"], ".1f"),
+        }
+        for row in card["draws"]
+    ]
+    lines = [f"{card['band']}: {card['verdict']}", *(f"  - {reason}" for reason in card["reasons"])]
+    lines += ["", tabulate(draws, "keys", tablefmt="plain", disable_numparse=True)]
     if card["next"]:
         lines += ["", "What would help most:", *(f"  - {step}" for step in card["next"])]
     page = Path(card["card"]).with_name("index.html").resolve()
     return "\n".join([*lines, "", f"Card: {card['card']}", f"Page: {page.as_uri()}"])
 
 
-def _value(row: dict) -> str:
-    unit = f" {row['unit']}" if row["unit"] else ""
-    if row["fixed"]:
-        return f"{row['value']:.4g}{unit}, fixed"
-    if row["low"] is None:
-        return f"{row['value']:.4g}{unit}"
-    return f"{row['value']:.4g}{unit}  ({row['low']:.4g} to {row['high']:.4g})"
-
-
-def _draw(row: dict) -> str:
-    at = f"{row['draw_y_m']:.4f}, {row['draw_z_m']:.4f} m"
-    text = f"  {row['target_m']:.3f} m    {at}"
-    if row["predicted_landing_m"] is None:
-        return f"{text}    the launch fails in simulation"
-    ends = row["interval_90_m"]
-    interval = f"{ends[0]:.3f} to {ends[1]:.3f} m" if ends else "not known       "
-    return (
-        f"{text}    {row['predicted_landing_m']:.3f} m   {interval}    {row['hold_force_n']:.1f} N"
-    )
+def _number(value: float | None, form: str, otherwise: str = "") -> str:
+    return otherwise if value is None else format(value, form)

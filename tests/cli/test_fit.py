@@ -244,12 +244,6 @@ CARD = {
     "band": "mine",
     "verdict": "with care",
     "reasons": ["It is not settled."],
-    "values": [
-        {"label": "stiffness E", "unit": "kPa", "value": 412.3, "low": 401, "high": 423.4}
-        | {"fixed": False},
-        {"label": "Poisson's ratio", "unit": "", "value": 0.47, "low": None, "high": None}
-        | {"fixed": True},
-    ],
     "draws": [
         {"target_m": 1.725, "draw_y_m": -0.3, "draw_z_m": -0.15, "predicted_landing_m": 1.726}
         | {"interval_90_m": [1.6, 1.9], "hold_force_n": 9.06},
@@ -264,11 +258,7 @@ def test_the_screen() -> None:
     text = shown(CARD | {"card": "bands/mine/card/README.md"})
     lines = text.splitlines()
     assert lines[:2] == ["mine: with care", "  - It is not settled."]
-    assert "  stiffness E      412.3 kPa  (401 to 423.4)" in lines
-    assert "  Poisson's ratio  0.47, fixed" in lines
-    assert any(
-        "1.725 m" in line and "1.600 to 1.900 m" in line and "9.1 N" in line for line in lines
-    )
+    assert any("1.725" in x and "1.600 to 1.900" in x and x.endswith("9.1") for x in lines)
     assert any("fails in simulation" in line for line in lines)
     assert lines[-2] == "Card: bands/mine/card/README.md" and len(lines) < 25
     assert re.fullmatch(r"Page: file://(/.*/bands/mine/card/index\.html)", lines[-1])

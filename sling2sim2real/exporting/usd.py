@@ -8,7 +8,7 @@ each tetrahedron,
 with Lame's mu and lam and the rotation R in F. It is stiffer than rubber when stretched, so that
 Young's modulus is scaled until a straight string of it holds as the calibrated simulation does.
 Where PhysX is at hand, modulus, mass, rest length and the clamps' height are then matched in it
-(ENTRY_POINTS).
+(MATCH).
 
 The stage opens with the straight band at rest: a volume whose `points` are bent while it is opened
 collapses across in PhysX (reports/validation/export-usd-causes.json), and holds too little. So the
@@ -18,10 +18,8 @@ ends are nodes to be led, not attachments; nodes.json says which, and where.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +41,7 @@ TARGET_MARGIN = 1.2  # times nearer and farther than policy.targets: landings th
 # What stages that are matched on paper alone leave in PhysX, least and most over three virtual
 # bands and three draws each: reports/validation/export-usd.json.
 ON_PAPER = {"hold_force": (0.02, 0.16), "landing": (0.01, 0.21)}
-ENTRY_POINTS = "sling2sim2real.matches"  # functions that match an export in its engine
+MATCH = "sling2sim2real.engines.physx.match:matched"  # in PhysX; None where that is not there
 
 
 @dataclass(frozen=True)
@@ -108,8 +106,7 @@ def to_usd(model: Model, folder: Path, _: int) -> dict:
     tube = Tube.of(model.sling, EDGES, GRADING)
     on_paper = float(np.sum(tension / unit) / len(draws))
     band = start = UsdBand(tube, on_paper, poisson, theta["dynamic_friction"])
-    match = match_of("usd")
-    done = match and match(model, band)
+    done: UsdMatch | None = imported(MATCH)(model, band)
     if done:
         band = done.band
     name = f"{model.band.name}.usda"
@@ -156,14 +153,6 @@ def near_draws(model: Model) -> tuple[np.ndarray, Launches]:
     (draws, ours), (near, far) = draws_of(model), model.settings.policy.targets
     good = (ours.landing_y > near / TARGET_MARGIN) & (ours.landing_y < far * TARGET_MARGIN)
     return (draws[good], ours[good]) if good.sum() > 2 else (draws, ours)
-
-
-def match_of(target: str) -> Callable[[Model, UsdBand], UsdMatch | None] | None:
-    """What an installed package offers to match a target in its engine; None: nothing."""
-    with suppress(ModuleNotFoundError):  # a light install lacks what the engine's side needs
-        for entry in entry_points(group=ENTRY_POINTS, name=target):
-            return imported(entry.value)
-    return None
 
 
 def nodes(band: UsdBand) -> dict:

@@ -7,36 +7,19 @@ million launches in seconds, and the error of reading between is itself measured
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
 from sling2sim2real.launching.surface.response_surface import NO_FAILURE, Landings, ResponseSurface
 
-
-class SimulatedLaunches(Protocol):
-    """N simulated launches."""
-
-    @property
-    def landing_y(self) -> np.ndarray:
-        """Landing on the floor [m], NaN where failed, shape (N,)."""
-        ...
-
-    @property
-    def hold_force(self) -> np.ndarray:
-        """Force that the hand holds before the release [N], shape (N,)."""
-        ...
-
-    @property
-    def failure(self) -> Sequence[str | None]:
-        """None, or the reason, length N."""
-        ...
-
-
-Launcher = Callable[..., SimulatedLaunches]  # of draws (N, 2) [m], without a force limit of its own
+# Of draws (N, 2) [m], without a force limit of its own, gives what has the landings on the floor,
+# `landing_y` (N,) [m], NaN where failed; `hold_force` before the release, (N,) [N]; and `failure`, of
+# length N, None or the reason.
+Launcher = Callable[..., Any]
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,8 @@ import numpy as np
 
 from sling2sim2real.launching.surface.response_surface import NO_FAILURE, Landings, ResponseSurface
 
-# Of draws (N, 2) [m], without a force limit of its own, gives what has the landings on the floor,
-# `landing_y` (N,) [m], NaN where failed; `hold_force` before the release, (N,) [N]; and `failure`, of
-# length N, None or the reason.
+# Of draws (N, 2) [m], without a force limit of its own; gives landings `landing_y` (N,) [m], NaN
+# where failed, `hold_force` (N,) [N] before the release, and `failure`: None or the reason, length N.
 Launcher = Callable[..., Any]
 
 

@@ -138,7 +138,7 @@ def _file(folder: BandFolder, recordings: Sequence[Path], sizes: Mapping[str, fl
     if "mass" not in sizes:
         raise UserError(f"{folder.name}: is new; weigh the band and give --mass KG, such as 0.0408")
     assumed = tuple(name for name in SIZES if name not in sizes)
-    return BandFile({**USUAL, **sizes}, assumed=assumed)
+    return BandFile.model_validate({**USUAL, **sizes, "assumed": assumed})
 
 
 def _bring_in(

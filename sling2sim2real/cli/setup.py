@@ -19,8 +19,8 @@ from sling2sim2real.api.band_folder import (
     BANDS,
     lab_settings,
     lab_settings_of,
+    mapping_of,
     plain,
-    read_yaml,
     write_yaml,
 )
 from sling2sim2real.base.errors import UserError
@@ -63,7 +63,7 @@ def set_up(measured: Mapping[str, Any], path: Path = BANDS / "lab.yaml") -> dict
         for key, value in new.items()
         if old[key] != plain(value)
     }
-    content = read_yaml(path) if path.is_file() else {}
+    content = mapping_of(path) if path.is_file() else {}
     section = content.get("setup") or {}
     for key, change in changed.items():
         both = key == "topics" and isinstance(section.get(key), dict)

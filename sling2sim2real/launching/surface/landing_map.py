@@ -17,7 +17,7 @@ import numpy as np
 from sling2sim2real.launching.surface.response_surface import NO_FAILURE, Landings, ResponseSurface
 
 # Of draws (N, 2) [m], without a force limit of its own; gives landings `landing_y` (N,) [m], NaN
-# where failed, `hold_force` (N,) [N] before the release, and `failure`: None or the reason, length N.
+# where failed, `hold_force` (N,) [N] before the release, and `failure`, length N: None or why.
 Launcher = Callable[..., Any]
 
 

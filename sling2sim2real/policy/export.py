@@ -107,7 +107,6 @@ def card(
     theta: dict,
     *,
     training: dict,
-    landing_map: dict,
     history: LaunchHistory | None = None,
     device: str = "cpu",
 ) -> dict:
@@ -117,8 +116,6 @@ def card(
         params: The whole of params.yaml.
         theta: Content of the theta file whose simulator the policy was trained in.
         training: What `check.figures` says of it; NaN becomes null.
-        landing_map: How well the interpolated launches go with simulated ones
-            (`landing_map.validation`).
         history: How the hand must draw the band, where its law remembers that.
         device: Where it was trained, "cpu" or "cuda".
     """
@@ -152,7 +149,6 @@ def card(
         "max_force_n": params.setup.max_force,
         "made_with": policy_settings_of(params, band),
         "training": _strict(training),
-        "landing_map": landing_map,
         "trained_on": {"device": device},
         "versions": {name: version(name).partition("+")[0] for name in USED},
     }

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from sling2sim2real.base.machine import kind
 from sling2sim2real.base.progress import Progress
-from sling2sim2real.launching.surface.landing_map import LandingMap, Launcher, validation
+from sling2sim2real.launching.surface.landing_map import LandingMap, Launcher
 from sling2sim2real.launching.surface.simulated import SimulatedLandings
 from sling2sim2real.policy.check import check, figures, verdict
 from sling2sim2real.policy.environment import projectile_start
@@ -37,19 +37,14 @@ def make_policy(
         progress: Told of each iteration.
     """
     settings = params.policy
-    landing_map = LandingMap.simulate(
-        launcher,
-        draw_y=params.setup.draw_y,
-        draw_z=params.setup.draw_z,
-        size=settings.map_size,
-        max_force=params.setup.max_force,
-        seed=settings.seed,
-    )
-    surface = landing_map.surface
-    if settings.landings == "simulated":  # the map then shows what the simulator does, no more
-        surface = SimulatedLandings(launcher, params.setup)
+    setup = params.setup
+    if settings.landings == "simulated":
+        surface = SimulatedLandings(launcher, setup)
+    else:
+        box = {"draw_y": setup.draw_y, "draw_z": setup.draw_z, "max_force": setup.max_force}
+        surface = LandingMap.simulate(launcher, **box, size=settings.map_size)
     seen = settings.state == "projectile_target"
-    start = projectile_start(params.setup, params.bands[band]) if seen else None
+    start = projectile_start(setup, params.bands[band]) if seen else None
     trained = train(surface, settings, progress, projectile=start)
     checked = check(trained.policy, launcher, params)
     training = figures(trained, checked, settings.landings)
@@ -61,7 +56,6 @@ def make_policy(
         method,
         theta,
         training=training,
-        landing_map=validation(landing_map, settings.targets),
         history=history,
         device=kind(),
     )

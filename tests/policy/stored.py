@@ -6,7 +6,7 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from sling2sim2real.launching.surface.landing_map import LandingMap, validation
+from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.policy.export import write_onnx
 from sling2sim2real.policy.train import Policy
 from tests.policy import toy
@@ -19,10 +19,9 @@ def write_stored(folder: Path) -> None:
     )
     card = {
         "training": {"converged": True, "mean_error_m": 0.004, "max_error_m": 0.01},
-        "landing_map": validation(chart, (1.425, 2.425)),
     }
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "card.json").write_text(json.dumps(card))
     torch.manual_seed(0)
     network = nn.Sequential(nn.Linear(1, 8), nn.ELU(), nn.Linear(8, 2))
-    write_onnx(Policy(network, (1.425, 2.425), chart.surface), folder / "policy.onnx")
+    write_onnx(Policy(network, (1.425, 2.425), chart), folder / "policy.onnx")

@@ -134,17 +134,13 @@ FIGURES = {
     "map_mean_error_m": 0.004,
     "failed_launches": {"holding force above the limit": 12},
 }
-NEAR = {"draws": 60, "mean_error_m": 0.001, "max_error_m": 0.004}
-MAP = {"box": {"draws": 0, "mean_error_m": None, "max_error_m": None}, "target_range": NEAR}
 
 
 def written(trained, training: dict, **theta) -> dict:
     """A card of band1 as a reader of the file finds it."""
     params = load(DEFAULTS)
     content = {"theta": dict.fromkeys(THETA, 0.4), **theta}
-    made = card(
-        trained.policy, params, "band1", "ours", content, training=training, landing_map=MAP
-    )
+    made = card(trained.policy, params, "band1", "ours", content, training=training)
     return json.loads(json.dumps(made, allow_nan=False))
 
 

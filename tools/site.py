@@ -42,7 +42,7 @@ def lay_out(folder: Path) -> None:
         if not name.startswith(LEFT_OUT) and (ROOT / name).is_file():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(ROOT / name, folder / name)
-    for file in (folder / "sling2sim2real").glob("*.py"):
+    for file in (folder / "sling2sim2real").rglob("*.py"):
         file.write_text(EXAMPLE.sub(_headed, file.read_text("utf-8")), encoding="utf-8")
     for file in (folder / "docs" / "notebooks").glob("*.ipynb"):
         file.with_suffix(".md").write_text(notebook(file), encoding="utf-8")

@@ -101,17 +101,7 @@ class SlingshotVectorEnv(VectorEnv):
         with its error; `landing` [m] and `hold_force` [N], NaN where there is none; `failure`, ""
         of a launch that lands. `final_obs` is what was seen before the new targets.
         """
-        center, half = self._box
-        draws = center + half * np.clip(np.asarray(actions, np.float32), -1, 1)
-        draws = draws.astype(float)
-        if self.error:
-            draws += self.error * self.np_random.standard_normal(draws.shape)
-            draws = np.clip(draws, self.surface.low, self.surface.high)
-        theta = ()
-        if self.samples is not None:
-            theta = (self.samples[self.np_random.integers(len(self.samples), size=len(draws))],)
-        goal = self.goal.astype(float)
-        reward, launched = rewarded(self.surface, draws, goal, self.reward, *theta)
+        reward, draws, launched = self.launch(actions)
         all_end = np.ones(self.num_envs, bool)
         info = {
             "draw": draws,
@@ -122,6 +112,22 @@ class SlingshotVectorEnv(VectorEnv):
             "_final_obs": all_end,
         }
         return self.reset()[0], reward, all_end, ~all_end, info
+
+    def launch(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, Landings]:
+        """Rewards, draws with their error [m] and landings of a step, whose targets stay."""
+        center, half = self._box
+        draws = center + half * np.clip(np.asarray(actions, np.float32), -1, 1)
+        draws = draws.astype(float)
+        if self.error:
+            draws += self.error * self.np_random.standard_normal(draws.shape)
+            draws = np.clip(draws, self.surface.low, self.surface.high)
+        theta = ()
+        if self.samples is not None:
+            theta = (self.samples[self.np_random.integers(len(self.samples), size=len(draws))],)
+        reward, launched = rewarded(
+            self.surface, draws, self.goal.astype(float), self.reward, *theta
+        )
+        return reward, draws, launched
 
     def _observed(self) -> np.ndarray:
         low, high = self.targets

@@ -42,8 +42,9 @@ class RslEnv(VecEnv):
 
     def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict]:
         """Launch, then set new targets. Actions have shape (num_envs, 2); every episode ends."""
-        _, reward, _, _, info = self.launches.step(torch.tanh(actions).numpy())
-        self.failures.update(reason for reason in info["failure"] if reason)
+        reward, _, launched = self.launches.launch(torch.tanh(actions).numpy())
+        reasons = self.launches.surface.reasons
+        self.failures.update(reasons[code] for code in launched.failure[launched.failure > 0])
         self._seen = self._reset()
         # No "time_outs": they would bootstrap a value into a problem that has no next state.
         reward = torch.from_numpy(reward).float()

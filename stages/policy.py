@@ -14,6 +14,7 @@ from sling2sim2real.base.machine import device
 from sling2sim2real.base.progress import Progress
 from sling2sim2real.identification.results.theta import history_of, load_theta
 from sling2sim2real.launching.surface.simulator import simulator
+from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.policy.make import make_policy
 from stages.start import pair_of_stage, run
 
@@ -26,7 +27,7 @@ def main() -> None:
     clamps, theta = layout.clamps(pair), load_theta(layout.theta(pair), band)
     iterations = params.policy.iterations
     how = make_policy(
-        layout.policy(pair),
+        Stored(layout.policy(pair)),
         simulator(params, band, theta, clamps, device=device()),
         params,
         band,

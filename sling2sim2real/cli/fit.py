@@ -311,19 +311,8 @@ def _with_policy(folder: BandFolder, found: Identification, steps: Steps) -> Ide
     from sling2sim2real.policy.make import make_policy
 
     steps.begin(POLICY)
-    with replacing_folder(folder.path / "training") as temporary:
-        how = make_policy(
-            temporary,
-            found.launches,
-            settings,
-            name,
-            METHOD,
-            content,
-            history=found.launch_setup.history,
-        )
-        for source, target in (("policy.onnx", stored.network), ("card.json", stored.card_file)):
-            os.replace(temporary / source, target)  # the card last: it says that both are there
-    steps.say(how)
+    history, whose = found.launch_setup.history, (settings, name, METHOD, content)
+    steps.say(make_policy(stored, found.launches, *whose, history=history))
     return replace(found, policy=stored)
 
 

@@ -15,6 +15,7 @@ import torch
 from torch import nn
 
 from sling2sim2real.base.files import replacing, write_json
+from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.policy.train import Policy, Trained
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.provenance import policy_settings_of
@@ -29,16 +30,16 @@ USED = ("sling2sim2real", "torch", "rsl-rl-lib", "onnx", "numpy")
 
 
 def export(
-    trained: Trained, folder: Path, params: Settings, band: str, method: str, theta: dict, **more
+    trained: Trained, stored: Stored, params: Settings, band: str, method: str, theta: dict, **more
 ) -> None:
-    """Write a policy's files into `folder`: the network, then its card.
+    """Write a policy's files: the network, then its card, which says that both are there.
 
     Args:
         params, band, method, theta, more: As `card` has them.
     """
-    write_onnx(trained.policy, folder / "policy.onnx")
+    write_onnx(trained.policy, stored.network)
     content = card(trained.policy, params, band, method, theta, **more)
-    write_json(folder / "card.json", content)
+    write_json(stored.card_file, content)
 
 
 def write_onnx(policy: Policy, path: Path) -> None:

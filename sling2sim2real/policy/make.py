@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from sling2sim2real.base.machine import kind
 from sling2sim2real.base.progress import Progress
 from sling2sim2real.launching.surface.landing_map import LandingMap, Launcher
 from sling2sim2real.launching.surface.simulated import SimulatedLandings
+from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.policy.check import check, figures, verdict
 from sling2sim2real.policy.environment import projectile_start
 from sling2sim2real.policy.export import export
@@ -17,7 +16,7 @@ from sling2sim2real.simulator.model import LaunchHistory
 
 
 def make_policy(
-    folder: Path,
+    stored: Stored,
     launcher: Launcher,
     params: Settings,
     band: str,
@@ -27,10 +26,10 @@ def make_policy(
     history: LaunchHistory | None,
     progress: Progress | None = None,
 ) -> str:
-    """Write policy.onnx and card.json; return how it went.
+    """Write a policy's network and card; return how it went.
 
     Args:
-        folder: Of these files.
+        stored: Where they are to lie.
         launcher: Simulates draws (N, 2) [m] of the calibrated band.
         params, band, method, theta: As `policy.export.card` has them.
         history: How the hand must draw the band, where its law remembers that.
@@ -50,7 +49,7 @@ def make_policy(
     training = figures(trained, checked, settings.landings)
     export(
         trained,
-        folder,
+        stored,
         params,
         band,
         method,

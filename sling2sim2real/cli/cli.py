@@ -226,10 +226,16 @@ def aim(arguments: argparse.Namespace) -> Done:
     flag(
         "--landing",
         type=kinds.landing,
-        required=True,
         metavar="M",
-        help="along the floor, in metres",
+        help="along the floor, in metres; or give the speed, or both",
     ),
+    flag(
+        "--speed",
+        type=kinds.speed,
+        metavar="V",
+        help="as it leaves the pouch, in m/s: parts a launch that loses energy from a wrong aim",
+    ),
+    flag("--angle", type=kinds.angle, metavar="A", help="there, in degrees above the horizon"),
     flag(
         "--error",
         type=kinds.draw_error,
@@ -246,7 +252,8 @@ def observe(arguments: argparse.Namespace) -> Done:
     from sling2sim2real.cli.observe import observe, shown
 
     use = CHECK if arguments.check else FIT
-    row = LaunchRow(arguments.draw, arguments.error, arguments.landing, use)
+    flown = {"speed": arguments.speed, "angle": arguments.angle}
+    row = LaunchRow(arguments.draw, arguments.error, arguments.landing, use, **flown)
     answer = observe(BandFolder.at(arguments.band), row, again=arguments.again)
     return kinds.shown(answer, True) if arguments.json else shown(answer)
 

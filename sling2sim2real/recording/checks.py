@@ -14,7 +14,7 @@ import numpy as np
 from sling2sim2real.recording.calibration import MATTERS, Calibration
 from sling2sim2real.recording.calibration import SURE as SHIFT_SURE
 from sling2sim2real.recording.clouds import Clouds, PictureLine, by_phase
-from sling2sim2real.recording.delays import Delays
+from sling2sim2real.recording.delays import SMALL, Delays
 from sling2sim2real.recording.events import CALM, OPENING, SETTLE, Part, Pull
 from sling2sim2real.recording.force import QUIET, flat_top
 from sling2sim2real.recording.frames import Geometry
@@ -35,7 +35,7 @@ FORCE_RATE, PICTURE_RATE = 900.0, 20.0  # Hz
 AHEAD = 0.01  # s of stamps before the force's, by the times of receipt
 BEHIND, SLOW = 0.02, {"color": 0.1, "depth": 0.1, "gripper": 0.1}  # s after; pictures take a while
 DRIFTED, UNKNOWN_CLOCK = 0.003, 0.02  # s over the recording
-DELAY = OPEN = 0.002  # s
+OPEN = 0.002  # s
 DRIFT = 0.02  # of the held force from grasp to release
 RELEASE = 0.001  # s
 ZERO_OFF, ZERO_UNSURE, ZERO_FAR, ZERO_SURE = 0.01, 0.02, 0.1, 2.0  # of the held force; errors
@@ -142,8 +142,8 @@ TABLE = (
     Check("delay",
         "the stamps of pose and camera with the force's, by what the recording shows",
         "the estimates' standard errors; what nothing shows the fit leaves open",
-        f"{1e3 * DELAY:g} ms and {SURE:g} standard errors, which are taken out; the pose's is not"
-        f" known to {1e3 * OPEN:g} ms; or two estimates disagree",
+        f"{1e3 * SMALL:g} ms and {SURE:g} standard errors, taken out where confirmed; the pose's is"
+        f" not known to {1e3 * OPEN:g} ms; or two estimates disagree",
         "",
         "record the force from the robot's own clock, or set episode.delays in params.yaml"),
     Check("release_pictures",
@@ -438,7 +438,7 @@ def _of_delays(delays: Delays) -> Iterator[Finding]:
     """Of pose and camera, beside what was given of them, and what the release's pictures show."""
     for role, delay in (("pose", delays.pose), ("camera", delays.camera)):
         error, late = delay.error or 0.0, delay.value - (delay.given or 0.0)
-        if abs(late) <= max(DELAY, SURE * error):
+        if abs(late) <= max(SMALL, SURE * error):
             continue
         what = (
             f"the stamps of the {role} are {1e3 * late:+.1f} ± {1e3 * error:.1f} ms late against"
@@ -454,7 +454,7 @@ def _of_delays(delays: Delays) -> Iterator[Finding]:
             cure = f"set episode.delays.{role} to what it is (0 where it is the robot's own motion)"
         yield found("delay", what, cure)
     left = delays.pose.left or 0.0
-    if left > OPEN:
+    if left > OPEN and not (delays.pose.alone or delays.conflict):
         what = (
             f"the pose's clock against the force's is not known better than ± {1e3 * left:.1f} ms"
         )
@@ -514,8 +514,9 @@ def _of_force(pull: Pull, signals: Signals, start: float, most: float) -> Iterat
     change = 0.0 if facts.zero_change is None else float(np.linalg.norm(facts.zero_change))
     unsure = ZERO_SURE * facts.zero_error
     if not facts.zero_steady and change > ZERO_OFF * hold:
-        what = f"the force's zero is {change:.2f} N off after the release, and did not get there"
-        what += f" steadily: the held force is unsure by up to {100 * change / hold:.0f} %"
+        what = f"the force's zero is {change:.2f} N off after the release, and the free hand"
+        what += " shows no steady drift to there: the held force is unsure by up to"
+        what += f" {100 * change / hold:.0f} %"
         yield found("zero", what, refused=change > ZERO_FAR * hold)
     elif unsure > ZERO_UNSURE * hold:
         what = f"the free hand's force is known to {unsure:.2f} N only, which is"

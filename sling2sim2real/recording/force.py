@@ -166,7 +166,8 @@ class Drift:
         rate: Of a steady drift, that is to be taken out (3,) [N/s]; 0 where it is not steady.
         change: From the lead-in to the free hand at the end (3,) [N]; None where that says nothing.
         error: Standard deviation of its length [N].
-        steady: Whether the course within both windows agrees with a steady drift.
+        steady: Whether the course within both windows agrees with a steady drift, and that within
+            one of them shows it.
     """
 
     rate: np.ndarray
@@ -203,7 +204,8 @@ def drift_of(
     other = any(
         abs(slope - speed) > max(SURE * spread, OTHER * speed) for slope, spread, _ in courses
     )
-    if size > max(MATTERS * drop, SURE * error) and other:
+    shown = any(SURE * spread < speed for _, spread, _ in courses)
+    if size > max(MATTERS * drop, SURE * error) and (other or not shown):
         return Drift(np.zeros(3), change, error, steady=False)
     return Drift(rate, change, error)
 

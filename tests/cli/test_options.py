@@ -59,7 +59,7 @@ ADDED = {
     " --json",
     LAUNCH: "--theta none.json, --json",
     "aim bands/toy --target 19": "--force, --json",
-    OBSERVE: "--error 0.002, --check, --json",
+    OBSERVE: "--error 0.002, --speed 5, --angle 40, --check, --json",
     OBSERVE.replace("2.3", "2.2"): "--again",
     EXPORT: "--out there, --samples 2, --json",
 }

@@ -15,7 +15,7 @@ from tests.project import DEFAULTS
 from validation.recordings import looks
 from validation.recordings.looks import BAND, LOOKS
 
-SETTINGS = load(DEFAULTS).cloud
+SETTINGS = load(DEFAULTS).cloud.model_copy(update={"sampling": "after_filters"})
 
 
 def tube(count: int, random: np.random.Generator) -> np.ndarray:

@@ -132,30 +132,32 @@ def truncated_gaussian(
 
 
 def without_each(density: Fit, coordinates: Coordinates, widening: float = 1.0) -> np.ndarray:
-    """How unlikely each launch is by all other evidence, as a standard score (leave-one-out).
+    """How unlikely each measurement of a launch is by all evidence but that launch (leave-one-out).
 
-    By the density's quadratic at its mode, within bounds: without launch i the precision is
-    H - d d' and the gradient g - d gap, d its column of `design`.
+    A standard score each. By the density's quadratic at its mode, within bounds: without a launch
+    the precision is H - d d' and the gradient g - d gap, d its columns of `design`.
 
     Args:
         density: As `widened` gives it.
         widening: By what the evidence's standard deviations are multiplied in it.
 
     Returns:
-        Shape (N,); positive where it landed further than predicted, NaN for a launch that fails.
+        Shape (M,); positive where it flew further than predicted, NaN for a launch that fails.
     """
     launches, box = density.launches, (coordinates.low, coordinates.high)
     assert launches is not None
-    scores, ridge = np.full(len(launches.gap), np.nan), np.diag(np.diag(density.hessian))
-    for i in np.flatnonzero(~launches.failed):
-        gap, slope = launches.gap[i], launches.design[:, i]
+    scores, ridge = np.full(len(launches.off), np.nan), np.diag(np.diag(density.hessian))
+    for i in np.unique(launches.launch[~launches.failed]):
+        mine = np.flatnonzero(launches.launch == i)
+        gap, design = launches.gap[mine], launches.design[:, mine]
         # Of a coordinate that this launch alone tells nothing else would be left.
-        rest = density.hessian - np.outer(slope, slope) / widening**2 + LEAST_LEFT * ridge
-        step = np.linalg.solve(rest, density.gradient - slope * gap / widening**2)
+        rest = density.hessian - design @ design.T / widening**2 + LEAST_LEFT * ridge
+        step = np.linalg.solve(rest, density.gradient - design @ gap / widening**2)
         rng = np.random.default_rng(i)
         phi = truncated_gaussian(density.phi + step, rest, *box, LEFT_SAMPLES, rng)
-        longer = ndtr((phi - density.phi) @ slope - gap).mean()  # chance of a longer landing
-        scores[i] = -ndtri(np.clip(longer, 1e-12, 1 - 1e-12))
+        off = (phi - density.phi) @ launches.slopes[:, mine] - launches.off[mine]
+        longer = ndtr(off / launches.spread[mine]).mean(axis=0)  # chance of a longer flight
+        scores[mine] = -ndtri(np.clip(longer, 1e-12, 1 - 1e-12))
     return scores
 
 

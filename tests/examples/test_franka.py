@@ -114,7 +114,7 @@ def test_the_fake_is_told_the_plan(execute, planned, monkeypatch) -> None:
         ("grasp", 0.0),
         ("open", 0.08),
     ]
-    assert fingers[1][3] == plan.grip_force
+    assert fingers[1][3] == load(DEFAULTS).setup.grip_force
     limits = [call[1] for call in fake.summary if call[0] == "limit"]
     assert max(limits[::2]) <= max(row["max_speed_m_s"] for row in rows) + 1e-9
 

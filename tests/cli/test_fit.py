@@ -231,7 +231,7 @@ def test_a_mistake_in_a_file_is_named_by_the_file(copied) -> None:
         (
             "bands/toy/launches.csv",
             "draw_y,draw_z,landing\n-0.3,-0.1,\n",
-            "launches.csv, line 2: a launch that did not land is no evidence",
+            "launches.csv, line 2: a launch that did not land, without a speed, is no",
         ),
         ("bands/toy/launches.csv", "draw_y,landing\n", "launches.csv: lacks the column draw_z"),
     ):

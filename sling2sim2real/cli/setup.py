@@ -24,7 +24,7 @@ from sling2sim2real.api.band_folder import (
     write_yaml,
 )
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.recording.frames import SURE, TOUCH, Loop
+from sling2sim2real.recording.frames import SURE, TOUCH, loop_of
 from sling2sim2real.recording.transforms import Transform
 from sling2sim2real.settings.lab import SetupParams
 
@@ -121,10 +121,10 @@ def changes_of(measured: Mapping[str, Any], setup: SetupParams) -> tuple[dict[st
             " fork is: give --left-tip and --right-tip too, or --camera-to-fork"
         )
     if camera is not None and seen is not None and fork is not None:
-        loop = Loop.of(fork, seen, camera, width)
-        if not loop.closed:
-            raise UserError(f"{loop}: measure the tips or the camera again")
-        checked.append(f"base, camera and fork agree: {loop}")
+        words, explained = loop_of(fork, seen, camera, width)
+        if not explained:
+            raise UserError(f"{words}: measure the tips or the camera again")
+        checked.append(f"base, camera and fork agree: {words}")
     fork = fork or (camera and seen and camera @ seen)
     seen = seen or (camera and fork and camera.inverse() @ fork)
     if seen is not None:

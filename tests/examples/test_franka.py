@@ -97,7 +97,7 @@ def test_the_fake_is_told_the_plan(execute, planned, monkeypatch) -> None:
     assert run(execute, monkeypatch, fake, folder) == 0
     moves = [call[1] for call in fake.summary if call[0] == "move"]
     assert moves[0][0] == "joints"
-    rows = plan.rows()
+    rows = plan.about["phases"]
     ways = [row for row in rows if row["max_speed_m_s"] > 0]
     for (place, turn), row in zip(moves[2:], ways, strict=True):
         np.testing.assert_allclose(place, row["base"], atol=2e-4)  # of a sample after it
@@ -108,7 +108,7 @@ def test_the_fake_is_told_the_plan(execute, planned, monkeypatch) -> None:
         ("grasp", 0.0),
         ("open", 0.08),
     ]
-    assert fingers[1][3] == plan.grip_force
+    assert fingers[1][3] == load(DEFAULTS).setup.grip_force
     limits = [call[1] for call in fake.summary if call[0] == "limit"]
     assert max(limits[::2]) <= max(row["max_speed_m_s"] for row in rows) + 1e-9
 

@@ -15,13 +15,13 @@ from sling2sim2real.exporting.chain import SpringChain
 from sling2sim2real.exporting.match import (
     HOLD_LIMIT,
     LANDING_LIMIT,
+    Matched,
     compared,
     draws_of,
     proof_draws,
 )
 from sling2sim2real.exporting.mujoco_replay import MujocoBand
 from sling2sim2real.exporting.newton_replay import NewtonReplay, loader, numbers
-from sling2sim2real.exporting.proof import Matched
 from sling2sim2real.simulator.launch import ballistic_landing
 from sling2sim2real.simulator.model import GRAVITY
 

@@ -1,9 +1,7 @@
 """PhysX's USD: valid by usd-core and by PhysX's own schemas; its law on paper."""
 
 import json
-import math
 from collections import Counter
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,7 +19,7 @@ from tests.project import ROOT
 def done(model, tmp_path_factory):
     """As without PhysX, wherever the test runs."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(usd, "match_of", lambda target: None)
+        patch.setattr("sling2sim2real.engines.physx.match.matched", lambda model, band: None)
         return export(model, "usd", tmp_path_factory.mktemp("exports") / "toy")
 
 
@@ -95,18 +93,6 @@ def test_usd_and_the_schemas_of_physx_know_all_that_is_in_it(done) -> None:
     assert points == pytest.approx(np.array(rest))  # bent ones collapse in PhysX
 
 
-def test_a_match_is_offered_by_an_entry_point_whose_module_can_be_imported(monkeypatch) -> None:
-    offered = {"usd": "math:sqrt", "newton": "no_such_module:match"}
-
-    def entry_points(group: str, name: str) -> list:
-        assert group == usd.ENTRY_POINTS
-        return [SimpleNamespace(value=offered[name])] if name in offered else []
-
-    monkeypatch.setattr(usd, "entry_points", entry_points)
-    assert usd.match_of("usd") is math.sqrt
-    assert usd.match_of("newton") is usd.match_of("mjcf") is None
-
-
 def test_a_launch_that_is_lost_in_the_engine_is_a_gap_in_the_card(
     model, tmp_path, monkeypatch
 ) -> None:
@@ -115,7 +101,7 @@ def test_a_launch_that_is_lost_in_the_engine_is_a_gap_in_the_card(
         landed = DrawCompared((-0.3, -0.1), (6.0, 6.1), (4.0, 4.1), (1.0, 1.1))
         return usd.UsdMatch(band, [landed], [lost, landed], [landed], "an engine")
 
-    monkeypatch.setattr(usd, "match_of", lambda target: match)
+    monkeypatch.setattr("sling2sim2real.engines.physx.match.matched", match)
     done = export(model, "usd", tmp_path / "usd")
     assert done.met is False and done.card["proof"][0]["landing_error"] is None
     text = (done.folder / "README.md").read_text()

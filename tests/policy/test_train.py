@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE
+from sling2sim2real.launching.surface.landing_map import TOO_MUCH_FORCE
 from sling2sim2real.launching.surface.simulated import SimulatedLandings
 from sling2sim2real.policy.train import Trained, train
 from tests.policy import toy
@@ -43,7 +43,7 @@ def same(first: Trained, second: Trained) -> bool:
 
 
 def test_the_same_settings_give_the_same_training_and_each_counts(toy_map, settings) -> None:
-    surface = toy_map.surface
+    surface = toy_map
     once, again = (train(surface, short(settings)) for _ in range(2))
     assert same(once, again)
     rewards = [{**vars(settings.reward), name: value} for name, value in REWARD.items()]
@@ -88,7 +88,7 @@ def test_a_policy_that_sees_the_projectile_hits_too(seeing, trained, settings) -
 @pytest.mark.parametrize("first", [1, 8])
 def test_a_landing_that_is_no_number_is_refused(toy_map, settings, first: int) -> None:
     """Neither a policy of the iteration before nor a traceback of PyTorch comes of it."""
-    surface, calls = toy_map.surface, itertools.count(1)
+    surface, calls = toy_map, itertools.count(1)
 
     class Broken:
         reasons, low, high = surface.reasons, surface.low, surface.high

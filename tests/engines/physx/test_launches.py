@@ -61,7 +61,7 @@ def engine(tmp_path, monkeypatch):
 def springs(monkeypatch):
     """Bands pull the pouch to the fork's middle with E [N/m]."""
 
-    def force_on(tube, sections, nodes, young, poisson, step):
+    def force_on(tube, sections, nodes, young, poisson):
         return -young[:, None] * nodes[:, sections[0]].mean(axis=1)
 
     monkeypatch.setattr(launches, "force_on", force_on)

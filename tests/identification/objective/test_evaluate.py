@@ -1,8 +1,6 @@
 """Batches of parameters: slicing, workers, failures, engines, and what is said of them."""
 
-import tomllib
 from dataclasses import replace
-from importlib.metadata import EntryPoint, EntryPoints
 
 import numpy as np
 import pytest
@@ -10,14 +8,12 @@ import pytest
 from pipeline.params import load
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.engines.physx import rollouts
-from sling2sim2real.identification.objective import evaluate
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator, simulate_of
 from sling2sim2real.identification.objective.loss import TERMS
-from sling2sim2real.settings.identification import ENGINES, OUR_ENGINE
 from sling2sim2real.simulator.parameters import THETA
 from tests.identification.objective import toy, toy_engine
-from tests.project import DEFAULTS, ROOT
+from tests.project import DEFAULTS
 from validation.synthetic import recorded_yardstick
 
 PARAMS = load(DEFAULTS)
@@ -82,17 +78,9 @@ def test_failures_are_infinite_and_have_a_reason() -> None:
     assert np.isnan(evaluation.terms["geom"][:2]).all()
 
 
-def test_an_installed_engine_is_found_by_its_name(monkeypatch) -> None:
-    """As pyproject.toml offers it; an installation from before that says what to do."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    offered = project["entry-points"][evaluate.ENTRY_POINT_GROUP]
-    points = EntryPoints(EntryPoint(*pair, evaluate.ENTRY_POINT_GROUP) for pair in offered.items())
-    monkeypatch.setattr(evaluate, "entry_points", points.select)
-    assert [*offered] == [name for name in ENGINES if name != OUR_ENGINE]
+def test_an_engine_of_ours_is_found_by_its_name() -> None:
+
     assert simulate_of("physx") is rollouts.simulate
-    monkeypatch.setattr(evaluate, "entry_points", EntryPoints().select)
-    with pytest.raises(UserError, match="engine physx: .* install this one anew"):
-        simulate_of("physx")
 
 
 @pytest.mark.parametrize(

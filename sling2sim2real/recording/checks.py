@@ -498,11 +498,8 @@ def _of_force(pull: Pull, signals: Signals, start: float, most: float) -> Iterat
         times = f"{top.begin:.2f} - {top.end:.2f} s"
         axis = "xyz"[top.axis]
         what = f"the force stops at {top.value:.1f} N along {axis} of the sensor ({times}),"
-        what, cure = f"{what} without noise: its range ends there", ""
-        if top.frozen:
-            what = f"the force does not change at all while it is large ({times}): the sensor froze"
-            cure = "see why its driver stopped, and record again"
-        yield found("range", what, cure, refused=True)
+        what += " without noise: its range ends there, or it froze"
+        yield found("range", what, refused=True)
     if facts.filtered:
         what = f"the force takes {1e3 * facts.release_spread:.1f} ms to fall from 9 to 3 tenths:"
         what += " it is filtered, and comes about as late"

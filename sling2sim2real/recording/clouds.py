@@ -207,13 +207,12 @@ def share_covered(scene: Scene, time: float, points: np.ndarray) -> float:
     if not len(points):
         return 0.0
     if scene.taut(time):
-        shares = []
+        near, shares = cKDTree(points), []
         for tip in scene.tips:
             way = scene.signals.hand(time) - tip
             length = np.linalg.norm(way)
             parts = np.arange(0.0, length - HAND, scene.diameter)[:, None] / length
-            nearest = np.linalg.norm((tip + parts * way)[:, None] - points[None], axis=-1)
-            shares.append(nearest.min(axis=1) < COVERED * scene.diameter)
+            shares.append(near.query(tip + parts * way)[0] < COVERED * scene.diameter)
         return float(np.mean(np.concatenate(shares)))
     places = np.arange(scene.tips[0, 0] + scene.diameter, scene.tips[1, 0], scene.diameter)
     if scene.holds(time):

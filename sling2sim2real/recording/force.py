@@ -330,20 +330,18 @@ NEAR_TOP = 0.05  # of an axis' way to its extreme value
 
 @dataclass(frozen=True)
 class FlatTop:
-    """The sensor's range ends.
+    """The sensor's range ends, or it stopped.
 
     Attributes:
         axis: Of the wrench's frame: 0, 1 or 2.
         value: At which it stops [N].
         begin, end: When it does [s].
-        frozen: No axis changes: it is the sensor that stopped, not its range.
     """
 
     axis: int
     value: float
     begin: float
     end: float
-    frozen: bool
 
 
 def flat_top(pull: Pull) -> FlatTop | None:
@@ -355,7 +353,6 @@ def flat_top(pull: Pull) -> FlatTop | None:
         return None
     noise = _scatter(_windows(raw[free], count)).min(axis=0)  # while it rests
     parts = _windows(raw[until], count)
-    change = np.diff(parts, axis=1)
     quick = count * pull.recording.wrench.period < SLOW_WINDOW
     still = _scatter(parts) <= (QUIET if quick else 0.0) * noise
     rest = raw[free].mean(axis=0)
@@ -369,8 +366,7 @@ def flat_top(pull: Pull) -> FlatTop | None:
     flat_samples = np.flatnonzero(flat[:, axis])
     begin, end = t[flat_samples[0] * count], t[(flat_samples[-1] + 1) * count - 1]
     value = float(np.median(parts[flat_samples, :, axis]))
-    frozen = bool(np.all(change[flat_samples] == 0))
-    return FlatTop(axis, value, float(begin), float(end), frozen)
+    return FlatTop(axis, value, float(begin), float(end))
 
 
 def _windows(x: np.ndarray, count: int) -> np.ndarray:

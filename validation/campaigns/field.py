@@ -6,8 +6,8 @@ Each fault of validation/recordings/faults.py is done to orange_2 in FOLDER and 
 the rig, in three sizes. What the checks say of it is kept; where no check of the fault's own
 concern speaks, the band is identified as if nothing were wrong, from the sound recording's values
 on, and compared with them; a fit that does not settle says so on the card. All sound recordings are
-checked too: each finding there is a false alarm. Results are lines of results.jsonl in --work: a run
-that was killed goes on from there.
+checked too: each finding there is a false alarm. Results are lines of results.jsonl in --work: a
+run that was killed goes on from there.
 """
 
 from __future__ import annotations

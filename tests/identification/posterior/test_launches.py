@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.identification.posterior import launches
@@ -16,7 +17,7 @@ from sling2sim2real.identification.posterior.launches import (
     LaunchLikelihood,
     Observed,
 )
-from sling2sim2real.identification.posterior.sampling import without_each
+from sling2sim2real.identification.posterior.sampling import truncated_gaussian, without_each
 from sling2sim2real.simulator.model import LaunchHistory, LaunchSetup
 
 STEPS = np.array([1e-3, 1e-3])
@@ -44,7 +45,13 @@ def expanded(*observed: Observed, phi=(0.0, 0.0)) -> LaunchExpansion:
 
 
 def scored(
-    launches: LaunchExpansion, prior: np.ndarray, pull=0.0, *, low=-9.0, widening=1.0
+    launches: LaunchExpansion,
+    prior: np.ndarray,
+    pull=0.0,
+    *,
+    low=-9.0,
+    widening=1.0,
+    spike=0.0,
 ) -> np.ndarray:
     """Scores without each, of a mode at 0 of launches and of others, which pull it [precision]."""
     hessian = prior + launches.landed.hessian / widening**2
@@ -52,7 +59,8 @@ def scored(
     density = SimpleNamespace(
         launches=launches, phi=np.zeros(2), hessian=hessian, gradient=gradient
     )
-    bounds = SimpleNamespace(low=np.array([low, -9.0]), high=np.array([9.0, 9.0]))
+    spikes = np.array([spike, 0.0])
+    bounds = SimpleNamespace(low=np.array([low, -9.0]), high=np.array([9.0, 9.0]), spikes=spikes)
     return without_each(density, bounds, widening)
 
 
@@ -232,6 +240,35 @@ def test_a_launch_is_not_accused_by_values_out_of_bounds() -> None:
     expected = (one.gap[0] + 0.2 * one.design[0, 0]) / spread
     assert free == pytest.approx(expected, rel=0.05) and free > 2
     assert abs(bounded) < 1
+
+
+def test_the_densest_landings_are_no_surprise_though_they_lie_at_an_end() -> None:
+    """Without it a is 0 for half of all bands, and for the others up to 0.3 or so: all longer."""
+    prior = np.diag([0.3**-2, 1e8])
+    at_end = expanded(Observed((-0.5, -0.2), 0.001, 0.30))  # as a = 0 has it
+    above = expanded(Observed((-0.5, -0.2), 0.001, 0.30 * np.exp(0.7)))
+    below = expanded(Observed((-0.5, -0.2), 0.001, 0.30 * np.exp(-0.2)))
+    ends = {"low": 0.0, "spike": np.sqrt(np.pi / 2) * 0.3}
+    score, longer, shorter = (scored(it, prior, **ends)[0] for it in (at_end, above, below))
+    assert abs(score) < 0.2
+    rarer = norm.sf(0.7 / 0.3)  # of half of the bands twice as many
+    assert longer == pytest.approx(-norm.ppf(rarer / 2), rel=0.1) and shorter < -3
+
+
+def test_samples_of_a_rectified_prior_lie_at_its_end_as_often_as_it_says() -> None:
+    """Half, where the evidence tells nothing; else by the closed form."""
+    rng, one = np.random.default_rng(1), np.ones(1)
+    spike = np.array([np.sqrt(np.pi / 2) * 0.3])
+    free = truncated_gaussian(0 * one, np.diag([0.3**-2]), 0 * one, 9 * one, 4000, rng, spike)
+    assert np.mean(free == 0) == pytest.approx(0.5, abs=0.03)
+    precision = 0.3**-2 + 0.2**-2  # and evidence of 0.1 within 0.2
+    centre = np.array([0.1 / 0.2**2 / precision])
+    told = truncated_gaussian(centre, np.diag([precision]), 0 * one, 9 * one, 4000, rng, spike)
+    evidence = lambda x: np.exp(-0.5 * ((x - 0.1) / 0.2) ** 2)  # noqa: E731
+    x = np.linspace(0, 3, 30_001)
+    above = np.trapezoid(evidence(x) * np.exp(-0.5 * (x / 0.3) ** 2), x)
+    at_end = evidence(0) * spike[0]
+    assert np.mean(told == 0) == pytest.approx(at_end / (at_end + above), abs=0.03)
 
 
 @pytest.mark.parametrize(

@@ -142,9 +142,9 @@ TABLE = (
     Check("delay",
         "the stamps of pose and camera with the force's, by what the recording shows",
         "the estimates' standard errors; what nothing shows the fit leaves open",
-        f"{1e3 * SMALL:g} ms and {SURE:g} standard errors, taken out where confirmed; the pose's is"
-        f" not known to {1e3 * OPEN:g} ms; or two estimates disagree",
-        "",
+        f"{1e3 * SMALL:g} ms and {SURE:g} standard errors, which are taken out; the pose's is not"
+        f" known to {1e3 * OPEN:g} ms; or two estimates disagree",
+        "only the hand that starts back shows the pose's, or its tool's inertia contradicts it",
         "record the force from the robot's own clock, or set episode.delays in params.yaml"),
     Check("release_pictures",
         "the last picture of the drawn band and the next one with the fall of the force, and each"
@@ -322,12 +322,11 @@ def of_pictures(
         return
     phases = by_phase(rows)
     for row in phases:
-        if row.coverage < COVERAGE.get(row.phase, 0.0):
-            what = f"{100 * row.coverage:.0f} % of the band is covered while it"
-            yield found(
-                "coverage", f"{what} {SEEN_AS[row.phase]} ({row.start:.2f} - {row.end:.2f} s)"
-            )
-    for phase in SEEN_AS.keys() - {row.phase for row in phases}:
+        if row["coverage"] < COVERAGE.get(row["phase"], 0.0):
+            what = f"{100 * row['coverage']:.0f} % of the band is covered while it"
+            times = f"({row['start']:.2f} - {row['end']:.2f} s)"
+            yield found("coverage", f"{what} {SEEN_AS[row['phase']]} {times}")
+    for phase in SEEN_AS.keys() - {row["phase"] for row in phases}:
         cure = "record the camera from before the grasp until the band has swung"
         yield found("coverage", f"no picture shows how the band {SEEN_AS[phase]}", cure)
     measured = [(row.time, row.off_plane) for row in rows if row.off_plane is not None]
@@ -405,14 +404,12 @@ def _of_clock(stream: Stream, roles: list[str], force: float) -> Iterator[Findin
     if not -most <= offset <= AHEAD:
         what = f"the stamps of {stream.topic} are {offset:+.3f} s off the force's, judged"
         yield found("clock", f"{what} by the times of receipt")
-    clock = stream.clock
-    if abs(clock.change) > max(DRIFTED, SURE * clock.error):
-        size = f"{1e3 * clock.change:+.1f} ± {1e3 * clock.error:.1f} ms"
-        how = "over the recording" if clock.step is None else f"at about {clock.step:.0f} s"
-        goes = "drifts" if clock.step is None else "steps"
-        what = f"the clock of {stream.topic} {goes} by {size} against the force's {how}, judged"
-        refused = abs(clock.change) > max(UNKNOWN_CLOCK, SURE * clock.error)
-        yield found("clock", f"{what} by the times of receipt", refused=refused)
+    change, error = stream.drift
+    if abs(change) > max(DRIFTED, SURE * error):
+        what = f"the clock of {stream.topic} drifts or steps by {1e3 * change:+.1f} ±"
+        what += f" {1e3 * error:.1f} ms against the force's, judged by the times of receipt"
+        refused = abs(change) > max(UNKNOWN_CLOCK, SURE * error)
+        yield found("clock", what, refused=refused)
 
 
 def _of_frames(frame: str, geometry: Geometry, transforms) -> Iterator[Finding]:
@@ -424,18 +421,27 @@ def _of_frames(frame: str, geometry: Geometry, transforms) -> Iterator[Finding]:
         what = f"/tf_static puts {name!r} at two places, of which the last counts"
         cure = "publish it once, or set setup.camera_to_fork or base_to_fork in params.yaml"
         yield found("frames", what, cure)
-    if geometry.loop and not geometry.loop.closed:
+    if geometry.contradiction:
         given = [
             f"setup.{name}"
             for name in ("base_to_fork", "camera_to_fork")
             if geometry.sources[name].startswith("setup")
         ]
         cure = f"{' or '.join(given)} contradicts /tf_static: {CHECKS['frames'].remedy}"
-        yield found("frames", str(geometry.loop), cure)
+        yield found("frames", geometry.contradiction, cure)
 
 
 def _of_delays(delays: Delays) -> Iterator[Finding]:
     """Of pose and camera, beside what was given of them, and what the release's pictures show."""
+    if delays.pose.alone:
+        value = delays.pose.value
+        what = delays.conflict or (
+            f"the hand starts back {1e3 * value:+.1f} ms from when the force falls: the stamps of"
+            " the pose are late or early by that, or the robot moves by itself"
+        )
+        cure = f"set episode.delays.pose in params.yaml: {value:.4f}, or 0 for its own motion"
+        yield found("delay", what, cure, refused=True)
+        return
     for role, delay in (("pose", delays.pose), ("camera", delays.camera)):
         error, late = delay.error or 0.0, delay.value - (delay.given or 0.0)
         if abs(late) <= max(SMALL, SURE * error):
@@ -449,12 +455,9 @@ def _of_delays(delays: Delays) -> Iterator[Finding]:
             what += f" beside the {delay.given:g} s that episode.delays.{role} says"
             cure = f"set it to {delay.value:.4f}, or to null"
         what += f", which is {'taken out' if delay.applied else 'not taken out'}"
-        if delay.alone:
-            what += "; only the hand that starts back shows it, as a robot's own motion would"
-            cure = f"set episode.delays.{role} to what it is (0 where it is the robot's own motion)"
         yield found("delay", what, cure)
     left = delays.pose.left or 0.0
-    if left > OPEN and not (delays.pose.alone or delays.conflict):
+    if left > OPEN:
         what = (
             f"the pose's clock against the force's is not known better than ± {1e3 * left:.1f} ms"
         )

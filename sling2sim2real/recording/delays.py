@@ -16,7 +16,8 @@ what is close to them is left out. Of a pull with other stamps, motion and grasp
 A robot that starts back by itself, shortly before or after the release, looks like a late or early
 pose: such a delay is taken out only where the camera, tied to the pose by the hand and to the force
 by the pictures of the release, confirms it. What nothing confirms, and estimates that contradict
-each other, stay in the stamps: that is said, and the fit looks for it as widely.
+each other, are not used: the pull is refused until `episode.delays` says what it is, for a fit that
+looks for it as widely finds another modulus.
 """
 
 from __future__ import annotations
@@ -59,8 +60,8 @@ class Estimate:
         left: Standard deviation of what the stamps may still be late [s].
         against: What the estimate is against: "force"; "release", as the force shows it; or "pose".
         given: What was given of it [s]; None where nothing was.
-        alone: Only the hand that starts back tells it, as a motion of the robot's own would: it is
-            not applied.
+        alone: Nothing confirms it: only the hand that starts back tells it, as a motion of the
+            robot's own would, or another estimate contradicts it. It is not applied.
     """
 
     value: float = 0.0
@@ -207,7 +208,10 @@ def _of_pose(pull: Pull, inertia: ToolInertia | None, given: float | None) -> tu
                 f"the pose is {1e3 * first:+.1f} ± {1e3 * its:.1f} ms late by the tool's inertia,"
                 f" but {1e3 * other:+.1f} ± {1e3 * others:.1f} ms by the hand that starts back"
             )
-            return Estimate.unseen(given, GIVEN_POSE, max(abs(first), abs(other))), words
+            if given is not None:
+                return Estimate.unseen(given, GIVEN_POSE, UNSEEN_POSE), words
+            left = float(np.hypot(first, its))
+            return Estimate(first, its, "estimated", False, left, alone=True), words
     elif given is not None and back is not None and back in estimates:
         if abs(back[0]) > SIGMAS * np.hypot(back[1], GIVEN_POSE):
             words = (

@@ -168,7 +168,8 @@ def test_two_estimates_are_weighed_or_said(looked_at, params, monkeypatch, back,
     estimates = correct_delays(pulled(*looked_at), params)[1]
     assert bool(estimates.conflict) == conflict and not estimates.pose.applied
     assert estimates.pose.value == pytest.approx(0.0 if conflict else back / 2)
-    assert estimates.pose.left == pytest.approx(back if conflict else 0.001 * np.sqrt(0.5 + 0.25))
+    assert estimates.pose.left == pytest.approx(0.001 * np.sqrt(1.0 if conflict else 0.75))
+    assert estimates.pose.alone == conflict
 
 
 def given(params, **delays):

@@ -273,8 +273,8 @@ def table(content: dict) -> list[str]:
     same, budgets = content["rank_correlation_of_loss_and_miss"]["methods"], content["settings"]
     heads = ("method", "rollouts", "its loss", "misses by [cm]", *bands, "bands where nearer")
     rows = [row(*heads), row("---", *["---:"] * (len(heads) - 1))]
-    for method, words in WORDS.items():
-        of = figures["all"]["methods"][method]
+    for method in filter(figures["all"]["methods"].__contains__, WORDS):
+        words, of = WORDS[method], figures["all"]["methods"][method]
         loss = f"{of['loss']['mean']:.3f}"
         cells = [words, f"{budgets['rollouts'][method]:,}", loss if method in same else f"({loss})"]
         cells.append(f"{of['miss_cm']['mean']:.1f}")

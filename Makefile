@@ -11,7 +11,7 @@ DEMO = data/raw/band1/dips/band1-dips.mcap
 
 demo: setup           # a virtual band: recorded with dips, then what README's `Your band` does with it
 	@test -f $(DEMO) || .venv/bin/python -m stages.record band1-dips
-	.venv/bin/sling fit $(DEMO) --mass 0.023 --diameter 0.010 --rest-length 0.52 --name mine
+	.venv/bin/sling fit $(DEMO) --mass 0.023 --diameter 0.0072 --rest-length 0.52 --name mine
 	@echo "Next: source .venv/bin/activate, then sling aim bands/mine --target 1.925"
 
 .venv/ready: pyproject.toml constraints.txt tools/setup.sh

@@ -64,7 +64,9 @@ def test_the_messages_know_what_the_extra_brings() -> None:
 def test_a_light_install_suffices_and_says_what_it_lacks(tmp_path: Path) -> None:
     how = "make setup, or pip install '.[run]' -c constraints.txt in the project's folder"
     assert sling(ROOT, "--help").returncode == 0
-    assert sling(tmp_path, "check", "no.mcap").stderr.endswith("error: no.mcap: no such file\n")
+    assert sling(tmp_path, "check", "no.mcap").stderr.endswith(
+        "error: no.mcap: no such file or directory\n"
+    )
     lacking = light(ROOT, SERVER)
     assert lacking.returncode == 1
     assert re.fullmatch(rf"error: \w+ is not installed: {re.escape(how)}\n", lacking.stderr)

@@ -54,7 +54,7 @@ def dips(recordings: list[dict]) -> dict[str, np.ndarray]:
         line
         for line in recordings
         if (line["pull"], line["method"]) == ("informative", POSTERIOR)
-        and not (line["worn"] or line["launched"] or "failed" in line)
+        and not (line["launched"] or "failed" in line)
     ]
     return {
         band: np.array([

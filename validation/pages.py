@@ -43,7 +43,7 @@ BLOCKS: dict[str, tuple[str, Callable[[], list[str]]]] = {  # by page: name of i
             {name: read(ROOT / landings.report_of(name)) for name in ("sealed",)}
         ),
     ),
-    "docs/paper.md": ("ablations", lambda: ablations.table(read(ROOT / ablations.LARGE))),
+    "docs/paper.md": ("ablations", lambda: ablations.table(read(ROOT / ablations.REPORT))),
     "docs/recording.md": ("field", lambda: field.table(read(ROOT / field.REPORT))),
 }
 

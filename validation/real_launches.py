@@ -216,7 +216,8 @@ def rms(values: np.ndarray) -> float:
 def predicted(bands: list[Slingshot], split: Split) -> dict:
     """Fit the chosen pellets of each band and predict the others; all, where all are chosen.
 
-    The damping is that of all bands, and beside it that of the other five.
+    The damping is that of all bands, and beside it that of the other five. "energy_rms" is of the
+    predicted pellets' measured energy over the rod's, less 1.
     """
     chosen = [split(len(band.mass)) for band in bands]
     fits = [
@@ -249,6 +250,7 @@ def predicted(bands: list[Slingshot], split: Split) -> dict:
         "predicted": len(every["rod"]),
         "rms_percent": {name: rms(values) for name, values in every.items()},
         "worst_percent": {name: np.abs(values).max() for name, values in every.items()},
+        "energy_rms": rms((1 + np.array(every["rod"]) / 100) ** -2 - 1),
         "bands": rows,
     }
 
@@ -304,7 +306,9 @@ def result(bands: list[Slingshot]) -> dict:
             "of what the weight says, mass fitted": spread(
                 row["modulus_over_that_by_weight"] for row in whole["bands"].values()
             ),
-            "between pellets of a band, rms": 2 * whole["rms_percent"]["rod"] / 100,
+            "of other pellets, by a rod fitted to three of the band, rms": splits[
+                "lightest, middle, heaviest"
+            ]["energy_rms"],
         },
         "without_a_launch": without_a_launch(bands, damping),
     }

@@ -1,35 +1,20 @@
-"""Rubbers for the virtual rig that no one chose by hand: four to develop on, 16 that are sealed.
+"""Rubbers for the virtual rig that no one chose by hand: four to develop on, 16 that are held out.
 
 A seed draws their laws, spectra, sizes and masses. DEVELOP is what a method may be developed on.
 SEALED is run once, with the default method as it then stands, and all of it is reported; a method
-that is changed after it was seen wants another seed. Six were spent so: 20261102, 20261124,
-20261207, 20270118, 20270305 and SPENT, whose rubbers now serve to explain. The sealed ones have
-elastic laws that no other rubber has, and every second one softens, half of these by strain
-(rig/physics/rubber.py), which no other does either.
+that is changed after it was seen wants another seed. Seven were spent so: 20261102, 20261124,
+20261207, 20270118, 20270305, 20270411 and SPENT, whose rubbers now serve to explain. The held-out
+ones have elastic laws that no other rubber has, and every second one softens, half of these by
+strain (rig/physics/rubber.py), which no other does either.
 
-The rules, written before any of these sealed rubbers was run:
-- posterior is the default method, if over the develop rubbers (three recordings each) and the
-  rig's bands (five each) the mean over bands of |bias| is less than that of the paper's method on
-  the same recordings; else the paper's. bias is the mean error without launch noise of nine
-  targets, as validation/density.py scores it.
-- `sling plan` writes a dip by default, if over the develop rubbers and the rig's bands both the
-  mean of |bias| and the median width of the intervals are less with it than with the paper's pull;
-  and three searched dips (reports/validation/pulls.json) instead, if both are less with these.
-- Of the recoil the pictures of the first 34 ms count instead of 50, if over the same 21 recordings
-  by dips the mean of |bias| is at most 0.3 points more, and at most 3 points fewer launches are
-  inside.
-- The default method leaves the flow open, if over the same 21 recordings by dips the mean of
-  |bias| is at most 0.3 points more than without it, and at most 3 points fewer launches are
-  inside; else it fixes it at 0. (Six of the 21, and one of SPENT, had been seen with it before.)
-- Samples of the density are those of a response surface, weighed by importance, if of its own law
-  (validation/campaigns/own_law.py) the mean distance of the coverages of coordinates and landings
-  from 90 % is less than by the Gaussian at the mode; else that Gaussian's. (A quarter of these
-  episodes had been seen with it before.)
-- tan delta is expected between 0.03 and 0.50 in 9 of 10 cases, the range of all kinds of rubber
-  in the published table, instead of 0.05 to 0.30, that of natural and silicone rubber, if over the
-  same 21 recordings by dips the mean of |bias| is at most 0.3 points more, and no fewer launches
-  are inside. (Sealed rubbers had been seen before: those of 20270305 with the narrower prior, whose
-  least covered lie at its upper end, those of SPENT with priors half and twice as wide.)
+The rules, written before any rubber of SEALED was run. Every choice had been made by then, on
+recordings of the rig's bands, the develop rubbers and the density's own law. By dips, of the 48
+recordings, as validation/campaigns/landings.py scores them:
+- the mean over bands of |bias| is at most 2.5 %, bias being a recording's mean error without launch
+  noise over nine targets;
+- 85 to 95 % of all launches are inside their 90 % intervals, and of the least covered rubber 60 %;
+- the median width of these intervals is at most 11 %.
+Nothing is chosen by them: each is reported as met or missed.
 """
 
 from __future__ import annotations
@@ -41,10 +26,10 @@ import numpy as np
 from pipeline.params import Params
 from validation.projects import changed
 
-DEVELOP, SEALED, SPENT = 20261101, 20270411, 20261229  # seeds
+DEVELOP, SEALED, SPENT = 20261101, 20281143, 20261229  # seeds
 COUNT = {DEVELOP: 4, SEALED: 16, SPENT: 16}
 RECORDINGS = 3  # of each
-DRAWN = 0.40  # m, by the rig's pull
+DENSITY = 900.0, 1200.0  # of rubbers [kg/m^3]
 KINDS = ("box", "wedge", "flow", "softening")  # two of them outside quasi-linear viscoelasticity
 LAWS = {  # of each constant: a centre, and the share by which it varies
     "ogden": ((0.69, 1.3, 0.01, 4.0, -0.0122, -2.0), 0.15),
@@ -85,7 +70,7 @@ def _rubber(kind: str, law: str, rng: np.random.Generator) -> tuple[dict, dict]:
         return float(f"{np.exp(value) if log else value:.4g}")
 
     diameter = between(0.008, 0.012)
-    mass = near(np.pi / 4 * diameter**2 * 0.52 * 750, 0.3)
+    mass = np.pi / 4 * diameter**2 * 0.52 * between(*DENSITY)
     constants, share = (LAWS | UNSEEN_LAWS)[law]
     rig_params = {
         "peak_force": between(10.0, 17.0),
@@ -123,19 +108,17 @@ def _rubber(kind: str, law: str, rng: np.random.Generator) -> tuple[dict, dict]:
     return band | {"rest_length": 0.52}, rig_params
 
 
-def with_rubbers(
-    params: Params, seed: int, recording: int, pull: str = "paper", worn: bool = False
-) -> Params:
+def with_rubbers(params: Params, seed: int, recording: int, pull: str = "paper") -> Params:
     """params.yaml with these bands besides, and the rig's seed of one of their recordings.
 
     Args:
         pull: By which they are recorded (`rig.recordings.plain.pull`).
-        worn: They were drawn as far before (`bands.<name>.preconditioned`).
     """
     drawn = rubbers(seed)
-    values: dict[str, object] = {"rig.seed": 100 + recording, "rig.recordings.plain.pull": pull}
+    values: dict[str, object] = {
+        "rig.seed": seed % 1000 + recording,
+        "rig.recordings.plain.pull": pull,
+    }
     for name, (band, rubber) in drawn.items():
         values |= {f"bands.{name}": band, f"rig.bands.{name}": rubber}
-    if worn:
-        values |= {f"bands.{name}.preconditioned": DRAWN for name in (*params.bands, *drawn)}
     return changed(params, values)

@@ -96,14 +96,9 @@ class RigBand(Section):
 
 
 class RigRecording(Section):
-    """How a recording is made: by which pull, and what tells its random numbers from others'.
-
-    Attributes:
-        stream: Stands behind the band's name where random numbers are drawn.
-    """
+    """How a recording is made."""
 
     pull: Pull
-    stream: str
 
 
 class RigWrench(Section):

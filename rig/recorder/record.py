@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
-from pipeline.params.run import PLAIN
+from pipeline.params.run import PLAIN, Recording
 from rig.physics.draw import sampled
 from rig.physics.motion import HandMotion
 from rig.physics.robot import SENSOR_LEVER, Robot
@@ -55,8 +55,7 @@ def record(
         recording: One of `rig.recordings`.
         picture_scale: Of the pictures' 640 x 480 pixels.
     """
-    made = params.rig.recordings[recording]
-    name = f"{band_name}{made.stream}"
+    name = Recording(band=band_name, recording=recording).key
     params = sampled(params, name)
     rig, setup = params.rig, params.setup
     rng = np.random.default_rng([rig.seed, *name.encode()])
@@ -69,7 +68,7 @@ def record(
     middle = hanging[string.middle]
     opening = rig.pads.opening_time, rig.pads.shape
     pulls = {"paper": (), "informative": params.plan.dips}
-    dips = pulls[made.pull]
+    dips = pulls[rig.recordings[recording].pull]
     motion = HandMotion.through(middle, rig.tracking_error, opening, motion_rng, dips)
     times = np.arange(round(motion.end * SENSOR_RATE)) / SENSOR_RATE
     phase = camera_rng.random()  # a camera's clock knows nothing of the hand's

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from scipy.special import ndtri
@@ -16,7 +16,6 @@ from sling2sim2real.identification.results.ranges import at_edges, searched
 from sling2sim2real.launching.trials.spread import LEVEL
 from sling2sim2real.quantities import QUANTITIES, rounded
 
-OUTSIDE = float(ndtri((1 + LEVEL) / 2))  # standard deviations: beyond the interval
 NEARLY = 0.02  # m below the highest that the hand goes: it no longer lifts
 SLACK = 0.3  # force along over force across the horizontal, below which the band only hangs
 FEWEST = 10  # samples
@@ -41,8 +40,12 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
     landing, low, high = (scored[n] for n in ("landing_y", "predicted_low", "predicted_high"))
     off, share = landing - scored.predicted_y, landing / scored.predicted_y - 1
     evidence = confidence.get("launches", [])
-    unlikely = [launch.get("z_without_it") for launch in evidence]
-    left = [abs(launch["left"]) for launch in evidence if launch["left"] is not None]
+    left = [
+        abs(launch["left"][name])
+        for launch in evidence
+        for name in ("landing", "speed")
+        if launch["left"].get(name) is not None
+    ]
     miss = np.abs(aims.landing - aims.target)
     widest = int(np.argmax(aims.half_width))
     return Findings(
@@ -77,8 +80,8 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
         bias_of_half=_known((2 * off / (high - low)).mean()),
         kind=" and ".join(dict.fromkeys(scored.kind)),
         left=max(left, default=0.0),
-        observed=len(left),
-        surprising=sum(abs(z) > OUTSIDE for z in unlikely if z is not None),
+        observed=sum(None not in launch["left"].values() for launch in evidence),
+        surprising=sum(_outside(launch["z_without_it"].values()) for launch in evidence),
         carried=None if force is None else carried(inputs.episode, force),
         density=_density(inputs),
         unloaded=any(
@@ -101,6 +104,12 @@ def carried(episode: Episode, force: np.ndarray) -> float | None:
     if slack.sum() < FEWEST or abs(weight := force[slack, 2].mean()) < LIGHTEST:
         return None
     return float(episode.force[slack, 2].mean() / weight)
+
+
+def _outside(scores: Collection[float | None]) -> bool:
+    """Whether any of a launch's standard scores is beyond what one launch in ten has (Šidák)."""
+    beyond = ndtri((1 + LEVEL ** (1 / len(scores))) / 2)
+    return any(abs(score) > beyond for score in scores if score is not None)
 
 
 def _known(value: float) -> float:

@@ -79,9 +79,9 @@ class Findings:
         bias, bias_error: Mean of landing over prediction, less 1, and its standard error.
         bias_of_half: Mean of landing less prediction, over the interval's half width.
         kind: Of those launches: measured or virtual.
-        left: Largest share by which an evidence launch is off the density's landing.
+        left: Largest share by which an evidence launch is off the density's landing, or speed.
         observed: Launches that are evidence.
-        surprising: Of those, how many landed outside the interval that all other evidence gives.
+        surprising: Of those, how many measured outside the interval that all other evidence gives.
         carried: Vertical force of the hanging band on the hand, measured over simulated; None where
             the simulated one is too small to tell.
         density: Of the band by its mass and size [kg/m^3]; None of the virtual rig's.
@@ -344,8 +344,8 @@ def _tried(findings: Findings):
     ):
         yield Reason(
             False,
-            f"{findings.surprising} of {launches_of(findings.observed)} used for the fit"
-            f" landed outside the {_LEVEL} interval that all other data give.",
+            f"The measurements of {findings.surprising} of {launches_of(findings.observed)} used"
+            f" for the fit lie outside the {_LEVEL} interval that all other data give.",
             "Measure that launch again, and another one at the same draw: a wrong draw or landing"
             " shifts all predictions.",
         )

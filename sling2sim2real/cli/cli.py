@@ -136,7 +136,7 @@ def setup(arguments: argparse.Namespace) -> Done:
     from sling2sim2real.cli import setup
 
     measured = {name: getattr(arguments, name) for name in kinds.MEASURED}
-    done = setup.set_up(setup.LabMeasures(**measured, topics=arguments.topic))
+    done = setup.set_up(measured | {"topics": arguments.topic})
     return kinds.shown(done, True) if arguments.json else setup.shown(done)
 
 
@@ -226,10 +226,16 @@ def aim(arguments: argparse.Namespace) -> Done:
     flag(
         "--landing",
         type=kinds.landing,
-        required=True,
         metavar="M",
-        help="along the floor, in metres",
+        help="along the floor, in metres; or give the speed, or both",
     ),
+    flag(
+        "--speed",
+        type=kinds.speed,
+        metavar="V",
+        help="as it leaves the pouch, in m/s: parts a launch that loses energy from a wrong aim",
+    ),
+    flag("--angle", type=kinds.angle, metavar="A", help="there, in degrees above the horizon"),
     flag(
         "--error",
         type=kinds.draw_error,
@@ -246,7 +252,8 @@ def observe(arguments: argparse.Namespace) -> Done:
     from sling2sim2real.cli.observe import observe, shown
 
     use = CHECK if arguments.check else FIT
-    row = LaunchRow(arguments.draw, arguments.error, arguments.landing, use)
+    flown = {"speed": arguments.speed, "angle": arguments.angle}
+    row = LaunchRow(arguments.draw, arguments.error, arguments.landing, use, **flown)
     answer = observe(BandFolder.at(arguments.band), row, again=arguments.again)
     return kinds.shown(answer, True) if arguments.json else shown(answer)
 
@@ -274,9 +281,9 @@ def observe(arguments: argparse.Namespace) -> Done:
 )
 def export(arguments: argparse.Namespace) -> Done:
     from sling2sim2real.api.band_folder import BandFolder
-    from sling2sim2real.api.exporting import export
     from sling2sim2real.base.disk import expect_writable
     from sling2sim2real.cli.export import shown
+    from sling2sim2real.exporting.export import export
 
     found = found_of(arguments)
     folder = BandFolder.at(arguments.band)

@@ -28,8 +28,9 @@ def observe(folder: BandFolder, row: LaunchRow, *, again: bool = False) -> dict:
         again: Whether one that equals another is one more launch, instead of a mistake.
 
     Returns:
-        `file`, `launches` in it, `measured_m`, what was predicted `before` and is `after`, and
-        `warnings`, which are printed on stderr before the fit.
+        `file`, `launches` in it, `measured_m`, `measured_speed` [m/s], `measured_angle` [degrees],
+        what was predicted `before` and is `after`, and `warnings`, which are printed on stderr
+        before the fit.
 
     Raises:
         UserError: It can be no launch, or is known already, and nothing is written; or a step
@@ -38,6 +39,8 @@ def observe(folder: BandFolder, row: LaunchRow, *, again: bool = False) -> dict:
     floor = -folder.settings.setup.fork_height
     if row.draw[1] <= floor:
         raise UserError(f"--draw: z = {row.draw[1]:g} m lies below the floor, z = {floor:g} m")
+    if row.landing is None and (row.speed is None or row.use != FIT):
+        raise UserError("--landing: is missing; only a launch to fit may have its --speed alone")
     before = Identification.load(folder.path) if folder.theta.is_file() else None
     known = any(row.equals(other) for other in folder.launches)
     if known and not again and before and not before.stale:
@@ -64,6 +67,8 @@ def observe(folder: BandFolder, row: LaunchRow, *, again: bool = False) -> dict:
         "launches": len(rows),
         "use": row.use,
         "measured_m": row.landing,
+        "measured_speed": row.speed,
+        "measured_angle": row.angle,
         "before": first,
         "after": after,
         "warnings": [asdict(doubt) for doubt in doubts],
@@ -79,6 +84,8 @@ def _prediction(found: Identification | None, row: LaunchRow) -> dict | None:
     return {
         "landing_m": None if launched.failure else launched.landing,
         "interval_90_m": launched.interval_90 and list(launched.interval_90),
+        "speed": None if launched.failure else launched.speed,
+        "angle": None if launched.failure else float(np.rad2deg(launched.angle)),
         "failure": launched.failure,
         "returned_share": found.theta.returned_share,
         "share_90": share and [share.low, share.high],
@@ -134,11 +141,19 @@ def shown(answer: dict) -> str:
         if note := answer[when]:
             share = _with_ends(note["returned_share"], note["share_90"], "")
             landed = note["failure"] and f"fails in simulation: {note['failure']}"
-            landed = landed or _with_ends(note["landing_m"], note["interval_90_m"], " m")
+            landed = landed or _flown(note["landing_m"], note["interval_90_m"], note)
             lines.append(f"{when:8}  landing {landed}, returned share {share}")
-    measured = answer["measured_m"]
-    lines.append(f"measured  {'did not land' if measured is None else f'{measured:.3f} m'}")
+    told = {"speed": answer["measured_speed"], "angle": answer["measured_angle"]}
+    lines.append(f"measured  {_flown(answer['measured_m'], None, told)}")
     return "\n".join(lines)
+
+
+def _flown(landing: float | None, ends: list[float] | None, left: dict) -> str:
+    """A landing with its interval [m], and speed [m/s] and angle [degrees] with which it left."""
+    parts = [] if landing is None else [_with_ends(landing, ends, " m")]
+    parts += [f"{left['speed']:.2f} m/s"] if left["speed"] is not None else []
+    parts += [f"{left['angle']:.1f} degrees"] if left["angle"] is not None else []
+    return ", ".join(parts)
 
 
 def _with_ends(value: float, ends: list[float] | None, unit: str) -> str:

@@ -133,33 +133,29 @@ def process(part: Part, band: BandParams, params: Settings, weighed: bool = True
     Args:
         weighed: Whether the band's mass is known: without it nothing is judged by the weight.
     """
-    done = Processed(part)
+    done, setup = Processed(part), params.setup
     try:
-        _process(done, band, params, weighed)
+        done.check(checks.of_topics(part))
+        pull, delays = correct_delays(Pull.of(part), params)
+        signals = signals_of(pull, params, delays.tool_inertia)
+        scene = Scene.of(band, setup, signals)
+        done.delays, done.signals, done.scene = delays, signals, scene
+        done.check(checks.of_signals(pull, delays, signals, scene, band, params, weighed))
+        view = done.view = View(pull.recording, part.geometry, scene, signals.duration)
+        clouds = clouds_of(view, params.cloud)
+        start = (signals.origin - part.recording.origin) * 1e-9
+        seen = over_time(scene, clouds, start), taut_coverage(scene, clouds)
+        eye, clamp = part.geometry.camera.translation, np.array(setup.clamp_direction)
+        calibration = calibration_of(
+            scene, clouds.time, clouds.points, eye, float(band.mass), clamp
+        )
+        done.whole = Whole(pull, delays, signals, scene, view, clouds, *seen, calibration, start)
+        done.check(checks.of_pictures(scene, clouds, *seen))
+        done.check(checks.of_calibration(calibration, part.geometry))
     except UserError as error:
         if not done.refusal:
             done.findings.append(Finding("pull", str(error), "", refused=True))
     return done
-
-
-def _process(done: Processed, band: BandParams, params: Settings, weighed: bool) -> None:
-    """Topics, events, delays, signals, pictures, with three check points. Raises UserError."""
-    part, setup = done.part, params.setup
-    done.check(checks.of_topics(part))
-    pull, delays = correct_delays(Pull.of(part), params)
-    signals = signals_of(pull, params, delays.tool_inertia)
-    scene = Scene.of(band, setup, signals)
-    done.delays, done.signals, done.scene = delays, signals, scene
-    done.check(checks.of_signals(pull, delays, signals, scene, band, params, weighed))
-    view = done.view = View(pull.recording, part.geometry, scene, signals.duration)
-    clouds = clouds_of(view, params.cloud)
-    start = (signals.origin - part.recording.origin) * 1e-9
-    seen = over_time(scene, clouds, start), taut_coverage(scene, clouds)
-    eye, clamp = part.geometry.camera.translation, np.array(setup.clamp_direction)
-    calibration = calibration_of(scene, clouds.time, clouds.points, eye, float(band.mass), clamp)
-    done.whole = Whole(pull, delays, signals, scene, view, clouds, *seen, calibration, start)
-    done.check(checks.of_pictures(scene, clouds, *seen))
-    done.check(checks.of_calibration(calibration, part.geometry))
 
 
 def episode_of(done: Processed, band_name: str) -> Episode:

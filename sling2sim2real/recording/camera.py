@@ -10,7 +10,6 @@ import numpy as np
 
 from sling2sim2real.base.errors import UserError
 
-LARGEST = 2**24  # pixels; a damaged size must not ask for more memory than this
 PINHOLE = ("", "plumb_bob", "rational_polynomial")
 RECTIFIED = re.compile("(^|[/_])rect(ified)?([/_]|$)")  # as image_proc names topics
 COUNTS = (4, 5, 8, 12, 14)  # of coefficients that OpenCV's pinhole model takes
@@ -75,16 +74,14 @@ class Calibration:
     rectified: np.ndarray
 
 
-def camera_from(
-    topic: str, calibration: Calibration, image: str, size: tuple[int, int] | None
-) -> Camera:
+def camera_from(topic: str, calibration: Calibration, image: str, size: tuple[int, int]) -> Camera:
     """The camera that took these images.
 
     Args:
         topic: Of the calibration.
         calibration: As it was read there.
         image: Topic of the images. The camera of rectified ones is P, without distortion.
-        size: Width and height of the images; None where none can be decoded.
+        size: Width and height of the images.
 
     Raises:
         UserError: where the camera is not calibrated, its model is not known, or its size is not
@@ -94,11 +91,10 @@ def camera_from(
     numbers = (*camera.matrix.flat, *camera.distortion, *calibration.rectified.flat)
     if min(camera.matrix[0, 0], camera.matrix[1, 1]) <= 0 or not np.isfinite(numbers).all():
         raise UserError(f"{topic} is not calibrated (focal length 0, or no numbers), calibrate it")
-    if not 0 < camera.width * camera.height <= LARGEST:
-        seen = f", {size[0]} x {size[1]}" if size else ""
+    if size != (camera.width, camera.height):
         raise UserError(
-            f"{topic} is of {camera.width} x {camera.height} pixels: publish it with the size of"
-            f" the images on {image}{seen}"
+            f"images of {image} are {size[0]} x {size[1]} pixels, {topic} is of"
+            f" {camera.width} x {camera.height}: publish the camera info of the images' own size"
         )
     if RECTIFIED.search(image) and calibration.rectified[0, 0] > 0:
         camera = replace(camera, matrix=calibration.rectified, distortion=np.zeros(0))
@@ -109,10 +105,5 @@ def camera_from(
         raise UserError(
             f"{topic} has distortion model {calibration.model!r} with {count} coefficients: publish"
             " plumb_bob (5) or rational_polynomial (8), or rectified images (of a fisheye)"
-        )
-    if size not in (None, (camera.width, camera.height)):
-        raise UserError(
-            f"images of {image} are {size[0]} x {size[1]} pixels, {topic} is of"
-            f" {camera.width} x {camera.height}: publish the camera info of the images' own size"
         )
     return camera

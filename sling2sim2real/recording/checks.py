@@ -14,7 +14,7 @@ import numpy as np
 from sling2sim2real.recording.calibration import MATTERS, Calibration
 from sling2sim2real.recording.calibration import SURE as SHIFT_SURE
 from sling2sim2real.recording.clouds import Clouds, PictureLine, by_phase
-from sling2sim2real.recording.delays import Delays
+from sling2sim2real.recording.delays import SMALL, Delays
 from sling2sim2real.recording.events import CALM, OPENING, SETTLE, Part, Pull
 from sling2sim2real.recording.force import QUIET, flat_top
 from sling2sim2real.recording.frames import Geometry
@@ -35,7 +35,7 @@ FORCE_RATE, PICTURE_RATE = 900.0, 20.0  # Hz
 AHEAD = 0.01  # s of stamps before the force's, by the times of receipt
 BEHIND, SLOW = 0.02, {"color": 0.1, "depth": 0.1, "gripper": 0.1}  # s after; pictures take a while
 DRIFTED, UNKNOWN_CLOCK = 0.003, 0.02  # s over the recording
-DELAY = OPEN = 0.002  # s
+OPEN = 0.002  # s
 DRIFT = 0.02  # of the held force from grasp to release
 RELEASE = 0.001  # s
 ZERO_OFF, ZERO_UNSURE, ZERO_FAR, ZERO_SURE = 0.01, 0.02, 0.1, 2.0  # of the held force; errors
@@ -142,9 +142,9 @@ TABLE = (
     Check("delay",
         "the stamps of pose and camera with the force's, by what the recording shows",
         "the estimates' standard errors; what nothing shows the fit leaves open",
-        f"{1e3 * DELAY:g} ms and {SURE:g} standard errors, which are taken out; the pose's is not"
+        f"{1e3 * SMALL:g} ms and {SURE:g} standard errors, which are taken out; the pose's is not"
         f" known to {1e3 * OPEN:g} ms; or two estimates disagree",
-        "",
+        "only the hand that starts back shows the pose's, or its tool's inertia contradicts it",
         "record the force from the robot's own clock, or set episode.delays in params.yaml"),
     Check("release_pictures",
         "the last picture of the drawn band and the next one with the fall of the force, and each"
@@ -322,12 +322,11 @@ def of_pictures(
         return
     phases = by_phase(rows)
     for row in phases:
-        if row.coverage < COVERAGE.get(row.phase, 0.0):
-            what = f"{100 * row.coverage:.0f} % of the band is covered while it"
-            yield found(
-                "coverage", f"{what} {SEEN_AS[row.phase]} ({row.start:.2f} - {row.end:.2f} s)"
-            )
-    for phase in SEEN_AS.keys() - {row.phase for row in phases}:
+        if row["coverage"] < COVERAGE.get(row["phase"], 0.0):
+            what = f"{100 * row['coverage']:.0f} % of the band is covered while it"
+            times = f"({row['start']:.2f} - {row['end']:.2f} s)"
+            yield found("coverage", f"{what} {SEEN_AS[row['phase']]} {times}")
+    for phase in SEEN_AS.keys() - {row["phase"] for row in phases}:
         cure = "record the camera from before the grasp until the band has swung"
         yield found("coverage", f"no picture shows how the band {SEEN_AS[phase]}", cure)
     measured = [(row.time, row.off_plane) for row in rows if row.off_plane is not None]
@@ -405,14 +404,12 @@ def _of_clock(stream: Stream, roles: list[str], force: float) -> Iterator[Findin
     if not -most <= offset <= AHEAD:
         what = f"the stamps of {stream.topic} are {offset:+.3f} s off the force's, judged"
         yield found("clock", f"{what} by the times of receipt")
-    clock = stream.clock
-    if abs(clock.change) > max(DRIFTED, SURE * clock.error):
-        size = f"{1e3 * clock.change:+.1f} ± {1e3 * clock.error:.1f} ms"
-        how = "over the recording" if clock.step is None else f"at about {clock.step:.0f} s"
-        goes = "drifts" if clock.step is None else "steps"
-        what = f"the clock of {stream.topic} {goes} by {size} against the force's {how}, judged"
-        refused = abs(clock.change) > max(UNKNOWN_CLOCK, SURE * clock.error)
-        yield found("clock", f"{what} by the times of receipt", refused=refused)
+    change, error = stream.drift
+    if abs(change) > max(DRIFTED, SURE * error):
+        what = f"the clock of {stream.topic} drifts or steps by {1e3 * change:+.1f} ±"
+        what += f" {1e3 * error:.1f} ms against the force's, judged by the times of receipt"
+        refused = abs(change) > max(UNKNOWN_CLOCK, SURE * error)
+        yield found("clock", what, refused=refused)
 
 
 def _of_frames(frame: str, geometry: Geometry, transforms) -> Iterator[Finding]:
@@ -424,21 +421,30 @@ def _of_frames(frame: str, geometry: Geometry, transforms) -> Iterator[Finding]:
         what = f"/tf_static puts {name!r} at two places, of which the last counts"
         cure = "publish it once, or set setup.camera_to_fork or base_to_fork in params.yaml"
         yield found("frames", what, cure)
-    if geometry.loop and not geometry.loop.closed:
+    if geometry.contradiction:
         given = [
             f"setup.{name}"
             for name in ("base_to_fork", "camera_to_fork")
             if geometry.sources[name].startswith("setup")
         ]
         cure = f"{' or '.join(given)} contradicts /tf_static: {CHECKS['frames'].remedy}"
-        yield found("frames", str(geometry.loop), cure)
+        yield found("frames", geometry.contradiction, cure)
 
 
 def _of_delays(delays: Delays) -> Iterator[Finding]:
     """Of pose and camera, beside what was given of them, and what the release's pictures show."""
+    if delays.pose.alone:
+        value = delays.pose.value
+        what = delays.conflict or (
+            f"the hand starts back {1e3 * value:+.1f} ms from when the force falls: the stamps of"
+            " the pose are late or early by that, or the robot moves by itself"
+        )
+        cure = f"set episode.delays.pose in params.yaml: {value:.4f}, or 0 for its own motion"
+        yield found("delay", what, cure, refused=True)
+        return
     for role, delay in (("pose", delays.pose), ("camera", delays.camera)):
         error, late = delay.error or 0.0, delay.value - (delay.given or 0.0)
-        if abs(late) <= max(DELAY, SURE * error):
+        if abs(late) <= max(SMALL, SURE * error):
             continue
         what = (
             f"the stamps of the {role} are {1e3 * late:+.1f} ± {1e3 * error:.1f} ms late against"
@@ -449,9 +455,6 @@ def _of_delays(delays: Delays) -> Iterator[Finding]:
             what += f" beside the {delay.given:g} s that episode.delays.{role} says"
             cure = f"set it to {delay.value:.4f}, or to null"
         what += f", which is {'taken out' if delay.applied else 'not taken out'}"
-        if delay.alone:
-            what += "; only the hand that starts back shows it, as a robot's own motion would"
-            cure = f"set episode.delays.{role} to what it is (0 where it is the robot's own motion)"
         yield found("delay", what, cure)
     left = delays.pose.left or 0.0
     if left > OPEN:
@@ -498,11 +501,8 @@ def _of_force(pull: Pull, signals: Signals, start: float, most: float) -> Iterat
         times = f"{top.begin:.2f} - {top.end:.2f} s"
         axis = "xyz"[top.axis]
         what = f"the force stops at {top.value:.1f} N along {axis} of the sensor ({times}),"
-        what, cure = f"{what} without noise: its range ends there", ""
-        if top.frozen:
-            what = f"the force does not change at all while it is large ({times}): the sensor froze"
-            cure = "see why its driver stopped, and record again"
-        yield found("range", what, cure, refused=True)
+        what += " without noise: its range ends there, or it froze"
+        yield found("range", what, refused=True)
     if facts.filtered:
         what = f"the force takes {1e3 * facts.release_spread:.1f} ms to fall from 9 to 3 tenths:"
         what += " it is filtered, and comes about as late"
@@ -514,8 +514,9 @@ def _of_force(pull: Pull, signals: Signals, start: float, most: float) -> Iterat
     change = 0.0 if facts.zero_change is None else float(np.linalg.norm(facts.zero_change))
     unsure = ZERO_SURE * facts.zero_error
     if not facts.zero_steady and change > ZERO_OFF * hold:
-        what = f"the force's zero is {change:.2f} N off after the release, and did not get there"
-        what += f" steadily: the held force is unsure by up to {100 * change / hold:.0f} %"
+        what = f"the force's zero is {change:.2f} N off after the release, and the free hand"
+        what += " shows no steady drift to there: the held force is unsure by up to"
+        what += f" {100 * change / hold:.0f} %"
         yield found("zero", what, refused=change > ZERO_FAR * hold)
     elif unsure > ZERO_UNSURE * hold:
         what = f"the free hand's force is known to {unsure:.2f} N only, which is"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
@@ -165,19 +166,6 @@ class PictureLine:
     off_plane: float | None
 
 
-@dataclass(frozen=True)
-class PhaseLine:
-    """The pictures of one phase: `empty` without a point, `points` the median."""
-
-    phase: str
-    start: float
-    end: float
-    pictures: int
-    empty: int
-    points: int
-    coverage: float
-
-
 def taut_coverage(scene: Scene, clouds: Clouds) -> tuple[float | None, float | None]:
     """How well the clouds see the drawn band, whose place is known: two lines, tip to hand.
 
@@ -207,13 +195,12 @@ def share_covered(scene: Scene, time: float, points: np.ndarray) -> float:
     if not len(points):
         return 0.0
     if scene.taut(time):
-        shares = []
+        near, shares = cKDTree(points), []
         for tip in scene.tips:
             way = scene.signals.hand(time) - tip
             length = np.linalg.norm(way)
             parts = np.arange(0.0, length - HAND, scene.diameter)[:, None] / length
-            nearest = np.linalg.norm((tip + parts * way)[:, None] - points[None], axis=-1)
-            shares.append(nearest.min(axis=1) < COVERED * scene.diameter)
+            shares.append(near.query(tip + parts * way)[0] < COVERED * scene.diameter)
         return float(np.mean(np.concatenate(shares)))
     places = np.arange(scene.tips[0, 0] + scene.diameter, scene.tips[1, 0], scene.diameter)
     if scene.holds(time):
@@ -263,22 +250,19 @@ def over_time(scene: Scene, clouds: Clouds, start: float) -> list[PictureLine]:
     ]
 
 
-def by_phase(rows: Sequence[PictureLine]) -> list[PhaseLine]:
-    """The rows of `over_time` gathered, phases without a picture left out."""
-    table = []
-    for name in PHASES:
-        part = [row for row in rows if row.phase == name]
-        if part:
-            points = [row.points for row in part]
-            table.append(
-                PhaseLine(
-                    phase=name,
-                    start=part[0].time,
-                    end=part[-1].time,
-                    pictures=len(part),
-                    empty=points.count(0),
-                    points=int(np.median(points)),
-                    coverage=round(float(np.mean([row.coverage for row in part])), 4),
-                )
-            )
-    return table
+def by_phase(rows: Sequence[PictureLine]) -> list[dict[str, Any]]:
+    """The rows of `over_time` gathered; `empty` are those without a point, `points` the median."""
+    parts = {name: [row for row in rows if row.phase == name] for name in PHASES}
+    return [
+        {
+            "phase": name,
+            "start": part[0].time,
+            "end": part[-1].time,
+            "pictures": len(part),
+            "empty": sum(not row.points for row in part),
+            "points": int(np.median([row.points for row in part])),
+            "coverage": round(float(np.mean([row.coverage for row in part])), 4),
+        }
+        for name, part in parts.items()
+        if part
+    ]

@@ -14,8 +14,10 @@ first, with the stamps as they were recorded. That they are off by such a delay 
 what is close to them is left out. Of a pull with other stamps, motion and grasp are estimated anew.
 
 A robot that starts back by itself, shortly before or after the release, looks like a late or early
-pose. The camera, tied to the pose by the hand and to the force by the pictures of the release,
-tells some of them apart; a delay that was given does; else both stay possible, which is said.
+pose: such a delay is taken out only where the camera, tied to the pose by the hand and to the force
+by the pictures of the release, confirms it. What nothing confirms, and estimates that contradict
+each other, are not used: the pull is refused until `episode.delays` says what it is, for a fit that
+looks for it as widely finds another modulus.
 """
 
 from __future__ import annotations
@@ -39,6 +41,7 @@ SIGMAS = 3.0  # what is less sure than this is not corrected
 MOST_ERROR = 0.003  # s: what is not known better counts as not seen
 LEAST_ERROR = 0.00005  # s: what no scatter shows
 WELL = 0.0005  # s: what is known as well is corrected, though it may be nothing
+SMALL = 0.002  # s: less is taken out by one estimate alone
 AT_ONCE = 0.04  # s: a hand that starts later does so by itself, not because the band lets it go
 UNSEEN_POSE, UNSEEN_CAMERA = 0.003, 0.02  # s: standard deviations where nothing tells
 GIVEN_POSE, GIVEN_CAMERA = 0.002, 0.005  # s: of what was given
@@ -57,7 +60,8 @@ class Estimate:
         left: Standard deviation of what the stamps may still be late [s].
         against: What the estimate is against: "force"; "release", as the force shows it; or "pose".
         given: What was given of it [s]; None where nothing was.
-        alone: Only the hand that starts back tells it, as a motion of the robot's own would.
+        alone: Nothing confirms it: only the hand that starts back tells it, as a motion of the
+            robot's own would, or another estimate contradicts it. It is not applied.
     """
 
     value: float = 0.0
@@ -135,38 +139,44 @@ def correct_delays(pull: Pull, params: Settings) -> tuple[Pull, Delays]:
         left = inertia.delay - pose.rest
         sure = abs(left) > SIGMAS * max(inertia.delay_error, LEAST_ERROR)
         inertia = replace(inertia, delay=left if sure else 0.0)
-    camera = Estimate.unseen(given.camera, GIVEN_CAMERA, UNSEEN_CAMERA)
-    release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
+
+    def at_the_release(pull: Pull) -> ReleasePictures | None:
+        return _or_none(lambda: release_pictures(pull, params.setup.fork_width))
+
+    release = at_the_release(pull)
     by_hand = _by_hand(pull, release)
+    camera, allowed = Estimate.unseen(given.camera, GIVEN_CAMERA, UNSEEN_CAMERA), 0.0
     if by_hand is not None:
         camera = Estimate.seen(*by_hand, against="pose", given=given.camera)
+        allowed = SIGMAS * (camera.error or 0.0)
     if camera.rest:
         pull = pull.shifted(camera=camera.rest)
-        release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
-    allowed = 0.0 if by_hand is None else SIGMAS * (camera.error or 0.0)
-    if pose.alone and release is not None:
-        by_itself = _by_itself(pose.rest, by_hand and by_hand[0], camera.rest, release, allowed)
-        pose = replace(pose, alone=by_itself is None)
-        if by_itself and by_hand is not None:
-            pull = pull.shifted(-pose.rest, -camera.rest)
-            rest = by_hand[0] - pose.rest
-            camera = Estimate.seen(rest, by_hand[1], against="pose", given=given.camera)
-            pose = Estimate(left=UNSEEN_POSE)
-            pull = pull.shifted(camera=camera.rest)
-            release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
-    if release is not None and release.beyond > allowed:
-        if by_hand is not None:
-            after = f"{1e3 * release.middle:+.0f} ± {1e3 * release.error:.0f} ms"
-            conflict = conflict or (
-                f"the hand in the pictures goes with the pose, but the band is let go {after} after"
-                " the force falls"
-            )
+        release = at_the_release(pull)
+    if pose.alone and release is not None and release.confirms(pose.value, allowed):
+        pose = replace(pose, applied=True, left=pose.error, alone=False)
+        if by_hand is not None:  # it goes with the pose
+            camera = Estimate.seen(camera.rest + pose.value, by_hand[1], "pose", given.camera)
+        pull = pull.shifted(pose.value, pose.value if by_hand else 0.0)
+        release = at_the_release(pull)
+    elif pose.alone and release is not None and release.off(pose.value) > allowed >= release.beyond:
+        pose = Estimate(left=UNSEEN_POSE)  # the hand moved by itself
+    if release is None:
+        return pull, Delays(pose, camera, inertia, release, conflict)
+    if by_hand is None and release.beyond:
         pull = pull.shifted(camera=release.middle)
-        value, error = (given.camera or 0.0) + camera.rest + release.middle, release.error
+        value, error = (given.camera or 0.0) + release.middle, release.error
         camera = Estimate(value, error, "estimated", True, error, given=given.camera)
-    elif release is not None and by_hand is None:
-        left = float(np.hypot(release.middle, release.error))
-        camera = replace(camera, left=left if given.camera is None else min(left, GIVEN_CAMERA))
+    elif by_hand is None:
+        around = float(np.hypot(release.middle, release.error))
+        camera = replace(camera, left=around if given.camera is None else min(around, GIVEN_CAMERA))
+    elif release.beyond > allowed:
+        pull = pull.shifted(camera=-camera.rest)
+        left = float(np.hypot(camera.rest + release.middle, release.error))
+        camera = Estimate.unseen(given.camera, left, left)
+        conflict = conflict or (
+            "the hand in the pictures goes with the pose, but the band is let go"
+            f" {1e3 * release.middle:+.0f} ± {1e3 * release.error:.0f} ms after the force falls"
+        )
     return pull, Delays(pose, camera, inertia, release, conflict)
 
 
@@ -179,25 +189,6 @@ def _by_hand(pull: Pull, release: ReleasePictures | None) -> tuple[float, float]
     near = release.middle if release is not None and release.beyond else 0.0
     matched = _or_none(lambda: camera_delay(pull.shifted(camera=near)))
     return (near + matched[0], matched[1]) if matched and matched[1] <= MOST_ERROR else None
-
-
-def _by_itself(
-    late: float, camera: float | None, taken: float, release: ReleasePictures, allowed: float
-) -> bool | None:
-    """Whether the hand starts back `late` [s] by itself, not by the pose's clock; None: who knows.
-
-    Args:
-        camera: Its delay [s] against a pose that is put right by `late`; None where no hand tells.
-        taken: What of it the stamps are corrected by [s].
-        release: With these stamps.
-        allowed: By which a delay may be outside of what `release` allows [s].
-    """
-    if release.never:
-        return None
-    if camera is None:  # a force's clock that is off explains both
-        return False if release.beyond and not release.off(late) else None
-    clock, itself = (release.off(camera - taken - shift) <= allowed for shift in (0.0, late))
-    return itself if itself != clock else None
 
 
 def _of_pose(pull: Pull, inertia: ToolInertia | None, given: float | None) -> tuple[Estimate, str]:
@@ -217,7 +208,10 @@ def _of_pose(pull: Pull, inertia: ToolInertia | None, given: float | None) -> tu
                 f"the pose is {1e3 * first:+.1f} ± {1e3 * its:.1f} ms late by the tool's inertia,"
                 f" but {1e3 * other:+.1f} ± {1e3 * others:.1f} ms by the hand that starts back"
             )
-            return Estimate.seen(first, its, given=given), words
+            if given is not None:
+                return Estimate.unseen(given, GIVEN_POSE, UNSEEN_POSE), words
+            left = float(np.hypot(first, its))
+            return Estimate(first, its, "estimated", False, left, alone=True), words
     elif given is not None and back is not None and back in estimates:
         if abs(back[0]) > SIGMAS * np.hypot(back[1], GIVEN_POSE):
             words = (
@@ -229,9 +223,10 @@ def _of_pose(pull: Pull, inertia: ToolInertia | None, given: float | None) -> tu
     weights = np.array([error**-2.0 for _, error in estimates])
     value = float(weights @ [value for value, _ in estimates] / weights.sum())
     error, against = float(weights.sum() ** -0.5), "release" if back in estimates else "force"
-    estimate = Estimate.seen(value, error, against, given)
-    alone = estimates == [back] and abs(value) > SIGMAS * error and given is None
-    return replace(estimate, alone=alone), ""
+    if estimates == [back] and abs(value) > max(SMALL, SIGMAS * error) and given is None:
+        left = float(np.hypot(value, error))
+        return Estimate(value, error, "estimated", False, left, against, alone=True), ""
+    return Estimate.seen(value, error, against, given), ""
 
 
 def _or_none(estimate: Callable[[], Found | None]) -> Found | None:

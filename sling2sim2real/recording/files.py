@@ -96,22 +96,20 @@ def read_container(path: Path) -> Container:
     if len(parts) > 1 and not path.is_dir():
         notes.append(f"all {len(parts)} parts of the bag were read, from {parts[0].name} on")
     for part in parts:
+        name = f"{part.name}: " if len(parts) > 1 else ""
         try:
             with part.open("rb") as file:
                 first = file.read(32)
-                file.seek(0)
                 if first.startswith((SQLITE, ROS1)):
                     _read_bag(part, first.startswith(ROS1), topics)
-                    continue
-                if not first.startswith(MAGIC):
+                elif first.startswith(MAGIC):
+                    losses += [f"{name}{loss}" for loss in _read_mcap(file, topics)]
+                else:
                     what = (what for magic, what in OTHERS.items() if first.startswith(magic))
                     nothing = "not an MCAP file or bag (ros2 bag record -s mcap writes one)"
                     raise UserError(f"{part}: {next(what, nothing)}")
-                read = _Mcap(topics, file)
         except OSError as error:
             raise UserError(f"{part}: cannot be read ({error.strerror})") from error
-        name = f"{part.name}: " if len(parts) > 1 else ""
-        losses += [f"{name}{loss}" for loss in read.losses()]
     return Container(path, list(topics.by_kind.values()), losses, notes)
 
 
@@ -128,108 +126,79 @@ class _Whole:
         return data
 
 
-class _Mcap:
-    """Reads an MCAP file, record by record, and keeps what was in the way.
-
-    Attributes:
-        dropped: First and last log times of damaged chunks [ns].
-        read: How many messages.
-        said: Messages that the file's end speaks of; None where it does not.
-        stopped: What ended the reading, in words.
-    """
-
-    def __init__(self, topics: _Topics, file: BinaryIO) -> None:
-        self.topics, self.bound = topics, dict[int, Topic]()
-        self.schemas: dict[int, kinds.Schema] = {0: NO_SCHEMA}
-        self.channels: dict[int, kinds.Channel] = {}
-        self.dropped: list[tuple[int, int]] = []
-        self.said: int | None = None
-        self.read, self.first, self.last = 0, 0, 0
-        self.stopped, ended = "", False
-        with suppress(*DAMAGE, OSError):  # the end repeats what a damaged chunk may have said
-            if summary := make_reader(file, validate_crcs=True).get_summary():
-                self.schemas |= summary.schemas
-                self.channels |= summary.channels
+def _read_mcap(file: BinaryIO, topics: _Topics) -> list[str]:
+    """Read an MCAP file, record by record; what was lost of it, in words."""
+    summary, schemas = None, {0: NO_SCHEMA}
+    channels: dict[int, kinds.Channel] = {}
+    with suppress(*DAMAGE, OSError):  # the end repeats what a damaged chunk may have said
         file.seek(0)
+        if summary := make_reader(file, validate_crcs=True).get_summary():
+            schemas |= summary.schemas
+            channels |= summary.channels
+    bound: dict[int, Topic] = {}  # a channel stays the first of its number
+    losses, dropped, times, count, ended = [], [], [], 0, False
+    file.seek(0)
+    reader = StreamReader(
+        _Whole(file),  # pyright: ignore[reportArgumentType]
+        emit_chunks=True,
+        validate_crcs=True,
+        record_size_limit=LIMIT,
+    )
+
+    def seconds(time: int) -> str:
+        return f"{(time - (times or [time])[0]) * 1e-9:.2f}"
+
+    try:
+        for record in _within_chunks(reader, dropped):
+            if isinstance(record, kinds.Schema):
+                schemas[record.id] = record
+            elif isinstance(record, kinds.Channel):
+                channels[record.id] = record
+            elif isinstance(record, kinds.Message):
+                count, number = count + 1, record.channel_id
+                channel = channels.get(number)
+                if number not in bound and channel and channel.schema_id in schemas:
+                    schema = schemas[channel.schema_id]
+                    bound[number] = topics.of(channel.topic, schema, channel.message_encoding)
+                if number in bound:  # nothing says what others are, as where a damaged chunk did
+                    bound[number].add(record.log_time, record.data)
+                    times = [*times[:1], record.log_time]
+            ended |= isinstance(record, kinds.DataEnd)
+    except CRCValidationError:
+        if not dropped:
+            losses.append("the checksum of all messages together does not hold: some are damaged")
+    except DAMAGE:
+        if not ended:
+            at, size = file.tell(), file.seek(0, 2)
+            losses.append(
+                f"cut off or damaged after {seconds((times or [0])[-1])} s, about byte {at} of"
+                f" {size}: nothing behind it was read (`mcap recover` may get more)"
+            )
+    if dropped:
+        where = [f"{seconds(a)} to {seconds(b)} s" for a, b in dropped]
+        losses.append(f"{counted(len(where), 'damaged chunk')} dropped: {few(where, NAMED)}")
+    if summary and summary.statistics and summary.statistics.message_count != count:
+        said = summary.statistics.message_count
+        losses.append(f"{count} of the {said} messages that the file counts were read")
+    return losses
+
+
+def _within_chunks(
+    reader: StreamReader, dropped: list[tuple[int, int]]
+) -> Iterator[kinds.McapRecord]:
+    """All records, those of chunks too; log times of damaged chunks [ns] go to `dropped`."""
+    for record in reader.records:
+        if not isinstance(record, kinds.Chunk):
+            yield record
+            continue
         try:
-            for record in self._records(_Whole(file)):  # pyright: ignore[reportArgumentType]
-                self._take(record)
-                ended |= isinstance(record, kinds.DataEnd)
-        except CRCValidationError:  # over all messages together
-            if not self.dropped:
-                self.stopped = "the checksum of all messages together does not hold"
-                self.stopped += ": what is damaged is not known"
+            if record.uncompressed_size > LIMIT:
+                raise ValueError("a chunk that is too large")
+            inside = breakup_chunk(record, validate_crc=True)
         except DAMAGE:
-            if not ended:
-                self.stopped = self._cut(file, file.tell())
-
-    def _records(self, file: BinaryIO) -> Iterator[kinds.McapRecord]:
-        reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=LIMIT)
-        for record in reader.records:
-            if not isinstance(record, kinds.Chunk):
-                yield record
-                continue
-            try:
-                if record.uncompressed_size > LIMIT:
-                    raise ValueError("a chunk that is too large")
-                inside = breakup_chunk(record, validate_crc=True)
-            except DAMAGE:
-                self.dropped.append((record.message_start_time, record.message_end_time))
-            else:
-                yield from inside
-
-    def _take(self, record: kinds.McapRecord) -> None:
-        if isinstance(record, kinds.Message):
-            self.read += 1
-            topic = self._topic_of(record.channel_id)
-            if topic is not None:
-                topic.add(record.log_time, record.data)
-                self.first = self.first or record.log_time
-                self.last = max(self.last, record.log_time)
-        elif isinstance(record, kinds.Schema):
-            self.schemas[record.id] = record
-        elif isinstance(record, kinds.Channel):
-            self.channels[record.id] = record
-        elif isinstance(record, kinds.Statistics):
-            self.said = record.message_count
-
-    def _topic_of(self, number: int) -> Topic | None:
-        """Of a channel, which stays the first of this number; None where nothing says what it is,
-        as where a damaged chunk did.
-        """
-        if number not in self.bound:
-            channel = self.channels.get(number)
-            schema = self.schemas.get(channel.schema_id) if channel else None
-            if channel is None or schema is None:
-                return None
-            self.bound[number] = self.topics.of(channel.topic, schema, channel.message_encoding)
-        return self.bound[number]
-
-    def losses(self) -> list[str]:
-        losses = [self.stopped] if self.stopped else []
-        if self.dropped:
-            where = [f"{self._seconds(a)} to {self._seconds(b)} s" for a, b in self.dropped]
-            count = counted(len(where), "damaged chunk")
-            losses.append(f"{count} dropped: {few(where, NAMED)}")
-        if self.said not in (None, self.read):
-            losses.append(f"{self.read} of the {self.said} messages that the file counts were read")
-        return losses
-
-    def _cut(self, file: BinaryIO, stopped: int) -> str:
-        """Where the file cannot be read."""
-        size = file.seek(0, 2)
-        file.seek(max(0, size - len(MAGIC)))
-        last = self._seconds(self.last)
-        if file.read() != MAGIC:
-            return f"the file has no end: cut off after {last} s"
-        return (
-            f"cannot be read from about byte {stopped} of {size} on, after {last} s"
-            " (`mcap recover` may get more of it)"
-        )
-
-    def _seconds(self, log_time: int) -> str:
-        """Since the first message."""
-        return f"{(log_time - (self.first or log_time)) * 1e-9:.2f}"
+            dropped.append((record.message_start_time, record.message_end_time))
+        else:
+            yield from inside
 
 
 def _read_bag(part: Path, ros1: bool, topics: _Topics) -> None:
@@ -269,25 +238,19 @@ def parts_of(path: Path) -> list[Path]:
     """
     path = Path(path)
     try:
-        if path.is_dir():
-            files = _files(path)
-            if len(files) == 1 or _is_split(files):
-                return files
-            some = ", ".join(file.name for file in files[:NAMED])
-            several = f"holds several recordings, or not all parts of one, name one file: {some}"
-            nothing = "is a folder without a recording (ros2 bag record -s mcap writes one)"
-            raise UserError(f"{path}: {several if some else nothing}")
-        if not path.is_file():
-            raise UserError(f"{path}: {'is not a file' if path.exists() else 'no such file'}")
-        if not path.stat().st_size:
-            raise UserError(f"{path}: is empty, record it again")
-        stem, number = _numbered(path)
-        if number < 0:
-            return [path]
-        alike = [file for file in _files(path.parent) if _numbered(file)[0] == stem]
-        return alike if _is_split(alike) else [path]
+        if path.is_file():
+            stem, number = _numbered(path)
+            alike = [file for file in _files(path.parent) if _numbered(file)[0] == stem]
+            return alike if number >= 0 and _is_split(alike) else [path]
+        files = _files(path)
+        if len(files) == 1 or _is_split(files):
+            return files
     except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror})") from error
+        raise UserError(f"{path}: {str(error.strerror).lower()}") from error
+    some = ", ".join(file.name for file in files[:NAMED])
+    several = f"holds several recordings, or not all parts of one, name one file: {some}"
+    nothing = "is a folder without a recording (ros2 bag record -s mcap writes one)"
+    raise UserError(f"{path}: {several if some else nothing}")
 
 
 def once(paths: Iterable[Path]) -> list[Path]:

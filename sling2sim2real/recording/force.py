@@ -166,7 +166,8 @@ class Drift:
         rate: Of a steady drift, that is to be taken out (3,) [N/s]; 0 where it is not steady.
         change: From the lead-in to the free hand at the end (3,) [N]; None where that says nothing.
         error: Standard deviation of its length [N].
-        steady: Whether the course within both windows agrees with a steady drift.
+        steady: Whether the course within both windows agrees with a steady drift, and that within
+            one of them shows it.
     """
 
     rate: np.ndarray
@@ -203,7 +204,8 @@ def drift_of(
     other = any(
         abs(slope - speed) > max(SURE * spread, OTHER * speed) for slope, spread, _ in courses
     )
-    if size > max(MATTERS * drop, SURE * error) and other:
+    shown = any(SURE * spread < speed for _, spread, _ in courses)
+    if size > max(MATTERS * drop, SURE * error) and (other or not shown):
         return Drift(np.zeros(3), change, error, steady=False)
     return Drift(rate, change, error)
 
@@ -227,6 +229,7 @@ def course(t: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
 LONGEST = 0.1  # s of either sign
 SMOOTH = 0.2  # s in which errors of the smoothed force go together
 LEAST_LOAD = 8.0  # standard deviations by which the tool's mass must show
+LEAST_MASS = 0.01  # kg: what weighs less is no tool
 WINDOW = 0.15  # s of the fits by which the load changes
 STEP = 0.002  # s of the grid on which the load is tabulated
 ROUNDS = 8
@@ -301,7 +304,7 @@ def estimate_tool_inertia(pull: Pull, tool: Tool | None) -> ToolInertia | None:
         left = right - np.einsum("tic,i->tc", columns, [mass, product])
         errors = _noise(left, blocks, 2 + 3 * len(np.unique(late))) * np.sqrt(np.diag(inverse))
         delay = float(np.clip(delay + product / mass, -LONGEST, LONGEST))
-    if abs(delay) >= LONGEST or abs(mass) < LEAST_LOAD * errors[0]:
+    if abs(delay) >= LONGEST or abs(mass) < max(LEAST_MASS, LEAST_LOAD * errors[0]):
         return None
     mass, delay_error = float(mass), float(errors[1] / abs(mass))
     return ToolInertia(mass, float(errors[0]), delay, delay_error, tuple(center.tolist()))
@@ -327,20 +330,18 @@ NEAR_TOP = 0.05  # of an axis' way to its extreme value
 
 @dataclass(frozen=True)
 class FlatTop:
-    """The sensor's range ends.
+    """The sensor's range ends, or it stopped.
 
     Attributes:
         axis: Of the wrench's frame: 0, 1 or 2.
         value: At which it stops [N].
         begin, end: When it does [s].
-        frozen: No axis changes: it is the sensor that stopped, not its range.
     """
 
     axis: int
     value: float
     begin: float
     end: float
-    frozen: bool
 
 
 def flat_top(pull: Pull) -> FlatTop | None:
@@ -352,7 +353,6 @@ def flat_top(pull: Pull) -> FlatTop | None:
         return None
     noise = _scatter(_windows(raw[free], count)).min(axis=0)  # while it rests
     parts = _windows(raw[until], count)
-    change = np.diff(parts, axis=1)
     quick = count * pull.recording.wrench.period < SLOW_WINDOW
     still = _scatter(parts) <= (QUIET if quick else 0.0) * noise
     rest = raw[free].mean(axis=0)
@@ -366,8 +366,7 @@ def flat_top(pull: Pull) -> FlatTop | None:
     flat_samples = np.flatnonzero(flat[:, axis])
     begin, end = t[flat_samples[0] * count], t[(flat_samples[-1] + 1) * count - 1]
     value = float(np.median(parts[flat_samples, :, axis]))
-    frozen = bool(np.all(change[flat_samples] == 0))
-    return FlatTop(axis, value, float(begin), float(end), frozen)
+    return FlatTop(axis, value, float(begin), float(end))
 
 
 def _windows(x: np.ndarray, count: int) -> np.ndarray:

@@ -26,55 +26,29 @@ EYE, EYE_TURN = 0.003, math.radians(0.3)  # of a hand-eye calibration: m, rad
 SURE = 3.0  # of them, from which it is no chance
 
 
-@dataclass(frozen=True)
-class Loop:
-    """What the loop is open by.
+def loop_of(
+    base_to_fork: Transform, camera_to_fork: Transform, base_to_camera: Transform, width: float
+) -> tuple[str, bool]:
+    """What the loop of three poses is open by, in words; whether errors of measuring explain it.
 
-    Attributes:
-        distance: Between the two places of the fork, in the base [m].
-        angle: Between its two orientations [rad].
-        most_distance, most_angle: What touched tips and a calibrated camera can be off by.
+    Args:
+        base_to_fork, camera_to_fork, base_to_camera: Of the fork in base and camera, and of the
+            camera in the base.
+        width: Between the fork's tips [m].
     """
-
-    distance: float
-    angle: float
-    most_distance: float
-    most_angle: float
-
-    @classmethod
-    def of(
-        cls,
-        base_to_fork: Transform,
-        camera_to_fork: Transform,
-        base_to_camera: Transform,
-        width: float,
-    ) -> Loop:
-        """Loop of the poses of the fork in base and camera, and of the camera in the base.
-
-        Args:
-            width: Between the fork's tips [m].
-        """
-        other = base_to_camera @ camera_to_fork
-        away = float(np.linalg.norm(camera_to_fork.translation))
-        return cls(
-            float(np.linalg.norm(other.translation - base_to_fork.translation)),
-            float((other.rotation.inv() * base_to_fork.rotation).magnitude()),
-            SURE * math.hypot(TOUCH, EYE, EYE_TURN * away),
-            SURE * math.hypot(math.sqrt(2) * TOUCH / width, EYE_TURN),
-        )
-
-    @property
-    def closed(self) -> bool:
-        """Whether errors of measuring explain what is left."""
-        return self.distance <= self.most_distance and self.angle <= self.most_angle
-
-    def __str__(self) -> str:
-        return (
-            f"the fork as seen by way of the camera lies {1e3 * self.distance:.1f} mm and"
-            f" {math.degrees(self.angle):.2f} degrees off where it lies in the robot's base"
-            f" (measuring explains {1e3 * self.most_distance:.0f} mm and"
-            f" {math.degrees(self.most_angle):.1f} degrees)"
-        )
+    other = base_to_camera @ camera_to_fork
+    away = float(np.linalg.norm(camera_to_fork.translation))
+    distance = float(np.linalg.norm(other.translation - base_to_fork.translation))
+    angle = float((other.rotation.inv() * base_to_fork.rotation).magnitude())
+    # What touched tips and a calibrated camera can be off by.
+    far = SURE * math.hypot(TOUCH, EYE, EYE_TURN * away)
+    wide = SURE * math.hypot(math.sqrt(2) * TOUCH / width, EYE_TURN)
+    words = (
+        f"the fork as seen by way of the camera lies {1e3 * distance:.1f} mm and"
+        f" {math.degrees(angle):.2f} degrees off where it lies in the robot's base (measuring"
+        f" explains {1e3 * far:.0f} mm and {math.degrees(wide):.1f} degrees)"
+    )
+    return words, distance <= far and angle <= wide
 
 
 FORK = "fork"
@@ -91,7 +65,8 @@ class Geometry:
         sensor: The wrench's frame to the end effector, or to frame O where `sensor_is_fixed`.
         sensor_is_fixed: The wrench is given in a frame that does not move with the hand.
         sources: Where each came from, in words.
-        loop: How base, camera and fork agree, where params and /tf_static tell all three poses.
+        contradiction: Of the poses of base, camera and fork, where params and /tf_static tell all
+            three and measuring does not explain it, in words.
     """
 
     base: Transform
@@ -100,7 +75,7 @@ class Geometry:
     sensor: Transform
     sensor_is_fixed: bool
     sources: dict[str, str]
-    loop: Loop | None = None
+    contradiction: str = ""
 
 
 @dataclass(frozen=True)
@@ -128,10 +103,11 @@ class EpisodeGeometry:
     def content(self) -> dict[str, Any]:
         """Return the geometry for an episode's metadata, where it stands under `geometry`."""
         camera = asdict(self.camera)
+        arrays = {key: camera[key].tolist() for key in ("matrix", "distortion")}
         return {
             "base_frame": self.base_frame,
             "base_to_fork": self.base_to_fork.pose(),
-            "camera": camera | {key: camera[key].tolist() for key in ("matrix", "distortion")},
+            "camera": camera | arrays,
             "camera_to_fork": self.camera_to_fork.pose(),
         }
 
@@ -146,12 +122,8 @@ class EpisodeGeometry:
             )
         camera = content["camera"]
         arrays = {key: np.array(camera[key], float) for key in ("matrix", "distortion")}
-        return cls(
-            content["base_frame"],
-            Transform.of(content["base_to_fork"]),
-            Camera(camera["width"], camera["height"], **arrays, frame=camera["frame"]),
-            Transform.of(content["camera_to_fork"]),
-        )
+        poses = {key: Transform.of(content[key]) for key in ("base_to_fork", "camera_to_fork")}
+        return cls(base_frame=content["base_frame"], camera=Camera(**camera | arrays), **poses)
 
 
 def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
@@ -187,15 +159,15 @@ def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
         raise _missing(recording, "base_to_fork", pose_frame, color_frame)
     if color_to_fork is None:
         raise _missing(recording, "camera_to_fork", color_frame, pose_frame)
-    join, loop = f"/tf_static {pose_frame} <- {color_frame}", None
+    join, odd = f"/tf_static {pose_frame} <- {color_frame}", ""
     if transforms[0] is None:
         sources["base_to_fork"] = f"{sources['camera_to_fork']}, and {join}"
     elif transforms[1] is None:
         sources["camera_to_fork"] = f"{sources['base_to_fork']}, and {join}"
     elif between is not None and any(source.startswith("setup") for source in sources.values()):
         poses = base.inverse(), color_to_fork.inverse(), between
-        loop = Loop.of(*poses, setup.fork_width)
-        sources["loop"] = str(loop)
+        sources["loop"], explained = loop_of(*poses, setup.fork_width)
+        odd = "" if explained else sources["loop"]
     color = _between_cameras(recording, color_frame, depth_frame)
 
     fixed = tree.between(pose_frame, wrench_frame) if wrench_frame else None
@@ -206,7 +178,7 @@ def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
         tool = _tool_frame(tree, wrench_frame, setup.tip_link)
         sensor = tree.between(tool, wrench_frame) or Transform.identity()
         sources["wrench"] = f"{wrench_frame} on {tool}, which the pose topic is taken to move"
-    return Geometry(base, color_to_fork @ color, color, sensor, fixed is not None, sources, loop)
+    return Geometry(base, color_to_fork @ color, color, sensor, fixed is not None, sources, odd)
 
 
 def _missing(recording: Recording, name: str, frame: str, other: str) -> UserError:

@@ -107,15 +107,14 @@ def chain_of(file: str, tip: str | None = None) -> Chain:
 def _joints(path: Path) -> list[Joint]:
     try:
         robot = ElementTree.parse(path).getroot()
-    except OSError as error:
-        raise UserError(f"setup.urdf: {path}: cannot be read ({error.strerror})") from error
-    except ElementTree.ParseError as error:
-        raise UserError(f"setup.urdf: {path}: not valid XML ({error})") from error
-    if any("xacro" in element.tag for element in robot.iter()):
-        raise UserError(f"setup.urdf: {path}: is a xacro, expand it (xacro in.xacro > out.urdf)")
+    except (OSError, ElementTree.ParseError) as error:
+        raise UserError(f"setup.urdf: {path}: cannot be read ({error})") from error
     joints = [element for element in robot.findall("joint") if element.find("parent") is not None]
-    if robot.tag != "robot" or not joints:
-        raise UserError(f"setup.urdf: {path}: no robot with joints in it")
+    if robot.tag != "robot" or not joints or any("xacro" in part.tag for part in robot.iter()):
+        raise UserError(
+            f"setup.urdf: {path}: no robot with joints in it; expand a xacro (xacro in.xacro >"
+            " out.urdf)"
+        )
     try:
         return [_joint(joint) for joint in joints]
     except (KeyError, ValueError) as error:

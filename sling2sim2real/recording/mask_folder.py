@@ -36,7 +36,7 @@ class FolderMask:
     def __init__(self, view: View):
         """Raises UserError where the folder or a mask is missing."""
         self.view, camera = view, view.recording.color_camera
-        self.folder, self.size = masks_beside(view.recording.path), (camera.width, camera.height)
+        self.folder, self.size = masks_beside(view.recording.path), (camera.height, camera.width)
         if not self.folder.is_dir():
             raise UserError(
                 f"{self.folder}: there is no such folder of masks: `sling check --pictures` writes"
@@ -54,11 +54,16 @@ class FolderMask:
     def mask(self, frame: RgbdFrame) -> np.ndarray:
         file = self._file(frame.number)
         try:
-            picture = images.grey(np.fromfile(file, np.uint8), self.size)
+            data = np.fromfile(file, np.uint8)
+            picture = images.unpacked(data, "a mask")
         except OSError as error:
             raise UserError(f"{file}: cannot be read ({error.strerror})") from None
         except images.Undecodable as error:
             raise UserError(f"{file}: {error}") from None
+        packed = data.tobytes().startswith(images.PNG)
+        if not packed or picture.dtype != np.uint8 or picture.shape != self.size:
+            height, width = self.size
+            raise UserError(f"{file}: is no grey PNG of 8 bits or 1, {width} x {height} pixels")
         return self.view.marked(picture > 0, frame)
 
     def _file(self, number: int) -> Path:

@@ -137,11 +137,7 @@ def _tried(make: Callable[[Any], Any], given: Any) -> Any:
 
 
 def decoder(schema: Schema, encoding: str) -> Decoder:
-    """A function from payload to a message with attributes; it raises anything.
-
-    Raises:
-        ValueError: where the encoding is not known or the schema is bad, in one line.
-    """
+    """A function from payload to a message with attributes; both raise anything."""
     make = DECODERS.get((schema.encoding, encoding))
     if encoding == "cdr" and _says_nothing(schema):
         make = _by_name
@@ -151,26 +147,23 @@ def decoder(schema: Schema, encoding: str) -> Decoder:
         raise ValueError(
             f"{what} with messages {encoding!r} cannot be read, record one of: {supported}"
         )
-    try:
-        read = make(schema)
-    except Exception as error:  # the parsers raise many kinds
-        raise ValueError(f"bad schema {schema.name} ({Unreadable.by(error)})") from error
+    read = make(schema)
     return (lambda payload: read(_plain(payload))) if encoding == "cdr" else read
 
 
 def _says_nothing(schema: Schema) -> bool:
     """Whether a standard type of ROS 2 is read by its name: its schema says no more, or in IDL."""
     name = _standard_name(schema.name)
-    if not name.startswith(PACKAGES) or name not in _store().fielddefs:
-        return False
-    if schema.encoding in ("", "omgidl", "ros2idl"):  # IDL, whose names of ROS types are well known
-        return True
-    return schema.encoding == "ros2msg" and schema.data.strip() in (b"", schema.name.encode())
+    named = not schema.data.strip() or schema.data.strip() == schema.name.encode()
+    says = schema.encoding == "ros2msg" and not named
+    known = name.startswith(PACKAGES) and name in _store().fielddefs
+    return known and not says and schema.encoding in ("", "omgidl", "ros2idl", "ros2msg")
 
 
 def _standard_name(schema: str) -> str:
     """a::msg::dds_::B_, as DDS has it, and a/B to a/msg/B."""
-    package, kind = re.split("::|/", schema)[0], re.split("::|/", schema)[-1]
+    parts = re.split("::|/", schema)
+    package, kind = parts[0], parts[-1]
     return f"{package}/msg/{kind.removesuffix('_') if '::' in schema else kind}"
 
 

@@ -66,6 +66,14 @@ class ReleasePictures:
         """How far a delay is outside of what the pictures allow [s]; 0 within."""
         return max(self.earliest - late, late - self.latest, 0.0)
 
+    def confirms(self, late: float, allowed: float) -> bool:
+        """Whether these pictures are possible only where the camera is `late` [s], within limits.
+
+        Args:
+            allowed: By which a delay may be outside of them [s].
+        """
+        return not self.never and self.off(late) <= allowed < self.off(0.0)
+
     @property
     def frozen(self) -> tuple[float, ...]:
         """Stamps of pictures that are sent again while the band must move [s]."""

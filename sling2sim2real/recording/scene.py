@@ -169,16 +169,10 @@ class View:
             return None
 
     def undecoded(self, role: str) -> UserError:
-        """Error that no picture of this role could be decoded, with the decoder's reason."""
-        stream = getattr(self.recording, role)
-        reason = "of another size than its camera info"
-        try:
-            getattr(images, role)(stream.values[self.index[0][role == "color"]])
-        except images.Undecodable as error:
-            reason = str(error)
+        """That no picture of this role can be decoded."""
         return UserError(
-            f"{self.recording.path}: no {'colour' if role == 'color' else role} picture of"
-            f" {stream.topic} between the window's start and end can be decoded: {reason}"
+            f"{self.recording.path}: no picture of {getattr(self.recording, role).topic} between"
+            " the window's start and end can be decoded, or is of its camera info's size"
         )
 
     def stamp(self, number: int) -> int:
@@ -274,51 +268,30 @@ class View:
         return camera.window(np.floor(pixels.min(axis=0)) - 5, np.ceil(pixels.max(axis=0)) + 6)
 
 
-LOOKS, LEAST = 15, 3  # pictures that are looked at, and of which the hand must be known
+LOOKS = 15  # pictures that are looked at
 AROUND = 4  # pixels to each side of the hand
 FITS = 1.3  # by which factor the hand's depth may be off for what covers it
-OFF_CENTER = 0.2  # of a picture's size: a lens is before its middle
 
 
 def why_no_band(view: View) -> str:
-    """What of the camera does not go with what is known of the hand, "" where all does."""
-    camera = view.recording.depth_camera
-    numbers = np.linspace(0, len(view) - 1, LOOKS).astype(int).tolist()
-    looked = {number: view.depth(number) for number in numbers}
-    blank = sum(depth is not None and not depth.any() for depth in looked.values())
-    if blank > len(looked) / 4:
-        count = len(looked)
-        return f"{blank} of {count} depth pictures hold no depth at all: does the emitter blink?"
-    size = np.array([camera.width, camera.height])
-    center = camera.matrix[[0, 1], 2]
-    if np.any(np.abs(center / size - 0.5) > OFF_CENTER):
-        at, whole = (f"{a:.0f} x {b:.0f}" for a, b in (center, size))
-        return (
-            f"the depth camera's principal point is at {at} of {whole} pixels: its camera_info is"
-            " of another resolution"
-        )
-    factors = np.array([*_hand(view, looked)])
-    off = (factors < 1 / FITS) | (factors > FITS)
-    if len(factors) < LEAST or off.mean() < 0.5:
-        return ""
+    """What of the depth does not go with where the hand is, "" where all does."""
+    camera, place = view.recording.depth_camera, view.geometry.camera.inverse()
+    factors = []
+    for number in np.linspace(0, len(view) - 1, LOOKS).astype(int).tolist():
+        depth, hand = view.depth(number), place.apply(view.scene.signals.hand(view.times[number]))
+        if depth is None or hand[2] <= 0:
+            continue
+        pixel = np.round(camera.project(hand[None])[0])
+        near = depth[camera.window(pixel - AROUND, pixel + AROUND + 1)]
+        if near.any():
+            factors.append(float(np.median(near[near > 0])) / hand[2])
+    if not factors:
+        return "there is no depth where the hand must be: does the emitter blink?"
     factor = float(f"{np.median(factors):.2g}")
+    if 1 / FITS < factor < FITS:
+        return ""
     return (
         f"the depth is about {factor:g} times what it must be at the hand: publish it as 16UC1 in"
         " millimetres or 32FC1 in metres, of the byte order that it says, or check the camera's"
-        " pose"
+        " pose and camera_info"
     )
-
-
-def _hand(view: View, looked: dict[int, np.ndarray | None]) -> Iterator[float]:
-    """Depth where the hand must be, over what it must be, of pictures in which both are known."""
-    camera, place = view.recording.depth_camera, view.geometry.camera.inverse()
-    for number, depth in looked.items():
-        hand = place.apply(view.scene.signals.hand(view.times[number])[None])
-        if depth is None or hand[0, 2] <= 0:
-            continue
-        u, v = np.round(camera.project(hand)[0]).astype(int)
-        if not (AROUND <= u < camera.width - AROUND and AROUND <= v < camera.height - AROUND):
-            continue
-        near = depth[v - AROUND : v + AROUND + 1, u - AROUND : u + AROUND + 1]
-        if near.any():
-            yield float(np.median(near[near > 0])) / hand[0, 2]

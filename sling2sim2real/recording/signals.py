@@ -15,7 +15,6 @@ from sling2sim2real.recording.force import ToolInertia, band_force
 from sling2sim2real.recording.frames import turned
 from sling2sim2real.recording.motion import Motion, expect_dense, interpolated
 from sling2sim2real.settings import Settings
-from sling2sim2real.settings.lab import Tool
 from sling2sim2real.settings.recording import EpisodeParams
 
 MOST_TURN = np.deg2rad(5.0)  # of the hand; beyond it the tool's weight has to be known
@@ -120,6 +119,7 @@ def signals_of(pull: Pull, params: Settings, inertia: ToolInertia | None = None)
     """
     tool, episode, recording = params.setup.tool, params.episode, pull.recording
     inertia = inertia if tool is None else None
+    taken = tool or inertia
     expect_dense(recording.wrench)
     t, force, motion = pull.force_time, pull.force, pull.motion
     grasp, release = pull.grasp, pull.release
@@ -161,7 +161,8 @@ def signals_of(pull: Pull, params: Settings, inertia: ToolInertia | None = None)
         peak_force=float(np.linalg.norm(pulled, axis=1).max()),
         flipped=band.flipped,
         turn=turn,
-        tool=_tool_facts(tool, "setup.tool") or _tool_facts(inertia, "its inertia"),
+        tool=taken
+        and ToolFacts(taken.mass, list(taken.center), "setup.tool" if tool else "its inertia"),
         longest_gap=gaps,
         release_error=release.error,
         release_fall=release.fall,
@@ -200,14 +201,9 @@ def _window(pull: Pull, episode: EpisodeParams) -> Window:
     window = window_of(episode, first, grasp, release, MARGIN)
     slack = 1.5 * max(recording.wrench.period, recording.pose.period)
     if window.start + window.duration > last + slack:
-        if last < release + episode.tail:
-            side = "after" if last >= release else "before"
-            raise UserError(
-                f"{ends} ends {abs(last - release):.2f} s {side} the release, episode.tail asks"
-                f" for {episode.tail} s after it: record on for longer"
-            )
         raise UserError(
-            f"it is {last - first:.2f} s long, episode.duration asks for {episode.duration} s:"
+            f"{ends} ends {last - release:+.2f} s after the release, after {last - first:.2f} s;"
+            f" episode.tail asks for {episode.tail} s, episode.duration for {episode.duration} s:"
             " record for longer"
         )
     return window
@@ -236,7 +232,3 @@ def _lets_back(motion: Motion, time: float) -> bool:
     """
     before, after = motion.position(time + np.array([-LATE, LATE]))
     return bool(np.linalg.norm(before) - np.linalg.norm(after) > TURN / 2)
-
-
-def _tool_facts(tool: Tool | ToolInertia | None, source: str) -> ToolFacts | None:
-    return tool and ToolFacts(tool.mass, list(tool.center), source)

@@ -55,24 +55,9 @@ WINDOW = 9  # messages around one
 SET_BACK = 0.01  # s by which both times of a message go back where a clock was set
 LEAST = 5  # percentile of the delays of receipt: some log_times may be damage
 TOLERANCE = 0.5  # s between the clocks of two topics: transport and drivers take less
-SECONDS = 5  # of least delays: fewer tell nothing of a clock's course
+PARTS = 5  # of the recording, in which the least delays of receipt of each second are compared
 
 Values = TypeVar("Values", bound=Any)
-
-
-@dataclass(frozen=True)
-class Clock:
-    """How a topic's clock goes against the wrench's, by the least delays of receipt.
-
-    Attributes:
-        change, error: Of its lead from the start of the recording to the end, and the standard
-            error [s].
-        step: When it steps [s of log_time since the first]; None where it drifts steadily.
-    """
-
-    change: float = 0.0
-    error: float = np.inf
-    step: float | None = None
 
 
 @dataclass(frozen=True)
@@ -89,7 +74,8 @@ class Stream(Generic[Values]):
         notes: What was lost or mended, in words.
         bursts: In which the stamps came; None where they were even.
         hold: For how long each value was repeated [s], 0 where it was not: repeats are left out.
-        clock: Against the wrench's, by the times of receipt.
+        drift: How far its clock's lead on the wrench's moves, by the times of receipt, and the
+            standard error [s].
     """
 
     topic: str
@@ -101,7 +87,7 @@ class Stream(Generic[Values]):
     notes: list[str] = field(default_factory=list)
     bursts: pace.Bursts | None = None
     hold: float = 0.0
-    clock: Clock = Clock()
+    drift: tuple[float, float] = (0.0, np.inf)
 
     def seconds(self, origin: int) -> np.ndarray:
         return (self.stamp - origin) * 1e-9
@@ -282,12 +268,12 @@ def streams_of(
                 raise
             remarks.append(f"{error}: done without it")
     remarks += _expect_one_clock(made, late)
-    streams = {role: stream for role, (stream, _) in made.items()}
-    wrench, wrench_log = made["wrench"]
-    for role in set(streams) - {"wrench", *OPTIONAL}:
-        clock = course_of(streams[role].stamp, made[role][1], wrench.stamp, wrench_log)
-        streams[role] = replace(streams[role], clock=clock)
-    return streams, remarks
+    return {
+        role: stream
+        if role == "wrench"
+        else replace(stream, drift=drift_of(stream, log, *made["wrench"]))
+        for role, (stream, log) in made.items()
+    }, remarks
 
 
 @dataclass
@@ -424,58 +410,51 @@ def _expect_one_clock(
     By the least delays of receipt. Raises UserError about the other topic that is furthest off.
     """
     least = {role: np.percentile(log - stream.stamp, LEAST) for role, (stream, log) in made.items()}
-    delay = {role: 1e-9 * (least[role] - least["wrench"]) for role in made}
-    middle, remarks = float(np.median(list(delay.values()))), []
+    ahead = {role: 1e-9 * (least["wrench"] - least[role]) for role in made}
+    middle, remarks = float(np.median(list(ahead.values()))), []
     for role in {*OPTIONAL} & {*made}:
-        if abs(delay.pop(role) - middle) > TOLERANCE:
+        if abs(ahead.pop(role) - middle) > TOLERANCE:
             stream, _ = made.pop(role)
             remarks.append(f"{stream.topic}: on another clock: done without it")
-    if np.ptp(list(delay.values())) <= TOLERANCE:
+    if np.ptp(list(ahead.values())) <= TOLERANCE:
         return remarks
-    worst = max(delay, key=lambda role: abs(delay[role] - middle))
-    roles = []
-    for name, of_name in DELAYED.items():
-        seen = [late.get(role, 0.0) - delay[role] for role in of_name]
-        if np.ptp(seen) < TOLERANCE and max(map(abs, seen)) > TOLERANCE / 2:
-            roles.append(f"episode.delays.{name}: {np.mean(seen):.3f}")
-    cure = ""
-    if roles:
-        cure = f"; or set {' and '.join(roles)} in params.yaml, by the times of receipt, which is"
-        cure += " good to some hundredths of a second alone"
+    worst = max(ahead, key=lambda role: abs(ahead[role] - middle))
+    off = {name: late.get(roles[-1], 0.0) + ahead[roles[-1]] for name, roles in DELAYED.items()}
+    given = [f"{name}: {by:.3f}" for name, by in off.items() if abs(by) > TOLERANCE / 2]
+    cure = "record all topics with one clock"
+    if given:
+        cure += f"; or set episode.delays.{' and episode.delays.'.join(given)} in params.yaml, by"
+        cure += " the times of receipt, which are good to some hundredths of a second alone"
     raise UserError(
-        f"the stamps of {made[worst][0].topic} are {middle - delay[worst]:+.3f} s off the other"
-        f" topics' clock, record all topics with one clock{cure}"
+        f"the stamps of {made[worst][0].topic} are {ahead[worst] - middle:+.3f} s off the other"
+        f" topics' clock, {cure}"
     )
 
 
-def course_of(
-    stamp: np.ndarray, log: np.ndarray, wrench: np.ndarray, wrench_log: np.ndarray
-) -> Clock:
-    """How a clock goes against the wrench's: a line or a step, whichever fits better.
+def drift_of(
+    stream: Stream[Any], log: np.ndarray, wrench: Stream[Any], wrench_log: np.ndarray
+) -> tuple[float, float]:
+    """How far a clock's lead on the wrench's moves, drifting or by a step, and its error [s].
+
+    Of parts of the recording the mean leads are compared: the least and the largest.
 
     Args:
-        stamp, log: Of the topic, and `wrench`, `wrench_log` of the force [ns], shapes (S,).
+        log, wrench_log: Times of receipt [ns], shapes (S,).
     """
     start = int(min(log.min(), wrench_log.min()))
-    mine, others = _least(log - start, log - stamp), _least(wrench_log - start, wrench_log - wrench)
-    time = np.array(sorted({*mine} & {*others}))
-    lead = np.array([mine[k] - others[k] for k in time]) * 1e-9
-    count = len(time)
-    if count < SECONDS:
-        return Clock()
-    slope, offset = np.polyfit(time, lead, 1)
-    left = np.sum((lead - offset - slope * time) ** 2)
-    error = np.sqrt(left / (count - 2) / np.sum((time - time.mean()) ** 2))
-    span = float(np.ptp(wrench)) * 1e-9
-    best = Clock(-float(slope) * span, float(error) * span)
-    for k in range(2, count - 1):
-        parts = lead[:k], lead[k:]
-        rest = sum(float(np.sum((part - part.mean()) ** 2)) for part in parts)
-        if rest < left:
-            left = rest
-            scatter = np.sqrt(rest / (count - 2) * (1 / k + 1 / (count - k)))
-            best = Clock(-float(parts[1].mean() - parts[0].mean()), float(scatter), float(time[k]))
-    return best
+    mine, others = (
+        _least(log - start, log - stream.stamp),
+        _least(wrench_log - start, wrench_log - wrench.stamp),
+    )
+    lead = np.array([others[second] - mine[second] for second in sorted({*mine} & {*others})])
+    if len(lead) <= PARTS:
+        return 0.0, np.inf
+    means = np.array([part.mean() for part in np.array_split(1e-9 * lead, PARTS)])
+    first, last = sorted([int(means.argmin()), int(means.argmax())])
+    # Neither a drift nor a step changes the median deviation of first differences much.
+    steps = np.diff(1e-9 * lead)
+    scatter = 1.4826 * np.median(np.abs(steps - np.median(steps))) / np.sqrt(2)
+    return float(means[last] - means[first]), float(scatter * np.sqrt(2 * PARTS / len(lead)))
 
 
 def _least(log: np.ndarray, delay: np.ndarray) -> dict[int, int]:

@@ -7,7 +7,6 @@ two arms pulled the band, is not guessed.
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -33,7 +32,6 @@ ALIKE = 0.9  # correlation of fingers that move as one
 OPTIONAL = ("gripper",)
 COMMANDS = ("goal", "desired", "command", "commanded", "cmd", "target", "reference", "setpoint")
 THINGS = ("camera", "object", "tag", "marker")
-COLOUR = {"color": "colour", "depth": "depth"}
 STILL = 1e-9  # m and quaternion: a transform that changes by more is no static one
 
 Convert = Callable[[np.ndarray], np.ndarray]
@@ -48,6 +46,7 @@ class Choice:
         topic: The whole of it.
         messages: log_time of each [ns], and its reading or why it cannot be read.
         why: One phrase.
+        size: Width and height of its pictures.
         convert: All values, shape (S, C), to what the role asks for, shape (S, 7) or (S, 1); None
             where the values are that already. Raises UserError.
     """
@@ -55,6 +54,7 @@ class Choice:
     topic: Topic
     messages: Messages
     why: str = ""
+    size: tuple[int, int] = (0, 0)
     convert: Convert | None = None
 
     @property
@@ -161,7 +161,7 @@ def _standing(role: Role, topic: Topic) -> tuple:
         -len(doubts),
         _rate(topic) >= role.rate,
         -role.types.index(topic.kind),
-        any(h in words or (len(h) > 3 and h in topic.name.lower()) for h in role.hints),
+        _hinted(role, topic),
     )
 
 
@@ -185,7 +185,7 @@ def choose(
         choice = chooser.choice(role, chosen)
         if choice is not None:
             chosen[role] = choice
-        elif role not in OPTIONAL:
+        elif role not in OPTIONAL or getattr(setup.topics, role):
             raise chooser.lacking(role)
     if chooser.ambiguous:
         raise UserError(
@@ -198,7 +198,7 @@ def choose(
 def camera_of(chosen: dict[str, Choice], role: str) -> Camera:
     """The camera of the images of `role`, color or depth. Raises UserError."""
     info, image = chosen[f"{role}_info"], chosen[role]
-    return camera_from(info.name, info.typical.value, image.name, _size(image))
+    return camera_from(info.name, info.typical.value, image.name, image.size)
 
 
 class _Chooser:
@@ -211,9 +211,15 @@ class _Chooser:
 
     def choice(self, role: str, chosen: dict[str, Choice]) -> Choice | None:
         self.problems, name = [], getattr(self.setup.topics, role)
+        hinted = sorted(self.topics, key=lambda topic: not _hinted(ROLES[role], topic))
+        fitting = [
+            choice
+            for topic in hinted
+            if name in (None, topic.name) and (choice := self._read(role, topic, name is not None))
+        ]
         if name is not None:
-            return self._named(role, name)
-        fitting = [choice for topic in self.topics if (choice := self._read(role, topic))]
+            most = max(fitting, key=lambda choice: len(choice.messages), default=None)
+            return most and replace(most, why=f"setup.topics.{role}")
         if role.endswith("_info"):
             return self._info(fitting, role.removesuffix("_info"), chosen)
         if role == "depth" and (frame := chosen["color"].typical.frame):  # registered to colour
@@ -228,28 +234,17 @@ class _Chooser:
         return replace(best, why=_why(ROLES[role], best, fitting))
 
     def lacking(self, role: str) -> UserError:
-        what = ROLES[role].what
-        if self.problems:
-            return UserError(f"no {what}; {'; or '.join(self.problems[:2])}")
+        """That nothing, or not what was named, can play the role that was asked for last."""
+        name = getattr(self.setup.topics, role)
+        what = f"setup.topics.{role} is {name}" if name else f"no {ROLES[role].what}"
         has = sorted({f"{topic.name} ({topic.kind or _type(topic)})" for topic in self.topics})
-        return UserError(
-            f"no {what}; the file has {few(has, SHOWN) or 'no messages at all'}, and none of a type"
-            f" that is read for it ({', '.join(ROLES[role].types)}): record one"
+        why = "; or ".join(self.problems[:2]) or (
+            f"the file has {few(has, SHOWN) or 'no messages at all'}, and there none of a type that"
+            f" is read for it ({', '.join(ROLES[role].types)}): record one"
         )
+        return UserError(f"{what}; {why}")
 
-    def _named(self, role: str, name: str) -> Choice:
-        topics = [topic for topic in self.topics if topic.name == name]
-        choices = [choice for t in topics if (choice := self._read(role, t, named=True))]
-        where = f"setup.topics.{role}"
-        if choices:
-            return replace(max(choices, key=lambda choice: len(choice.messages)), why=where)
-        if not topics:
-            has = few(sorted({topic.name for topic in self.topics}), SHOWN)
-            raise UserError(f"{where}: no topic {name}, the file has {has or 'none'}")
-        problem = f"{name} is a {_type(topics[0])}, not {' or '.join(ROLES[role].types)}"
-        raise UserError(f"{where}: {(self.problems or [problem])[0]}")
-
-    def _read(self, role: str, topic: Topic, named: bool = False) -> Choice | None:
+    def _read(self, role: str, topic: Topic, named: bool) -> Choice | None:
         """What a topic says for a role; None, with a word in `problems`, where it is of no use."""
         what = {*ROLES[role].shows} & {*topic.readings}
         if not what:
@@ -258,7 +253,7 @@ class _Chooser:
             if topic.problem:
                 raise UserError(topic.problem)
             if role in CAMERAS:
-                choice = _pictures(role, topic, named)
+                choice = _pictures(role, topic)
             elif role == "gripper":
                 choice = _gripper(topic, named)
             elif what == {"joints"}:
@@ -278,27 +273,30 @@ class _Chooser:
         Depth may take the colour camera's where it is registered to colour: in its frame and size.
         """
         image, color = chosen[role], chosen["color"]
-        frame, size = image.typical.frame, _size(image)
-        fitting: list[tuple[bool, bool, int, Choice]] = []
+        frame, fitting = image.typical.frame, []
         for info in infos:
             camera = info.typical.value.camera
             own = _beside(info.name, image.name)
             own &= role == "color" or not _beside(info.name, color.name)
             alike = 0 < len(frame) and camera.frame == frame
-            alike &= size in (None, (camera.width, camera.height))
+            alike &= image.size == (camera.width, camera.height)
             if own or alike:
                 fitting.append((own, alike, len(info.messages), info))
             else:
-                pixels = f", {size[0]} x {size[1]}" if size else ""
                 self.problems.append(
                     f"{info.name} is of frame {camera.frame!r}, {camera.width} x {camera.height}"
-                    f" pixels, {image.name} of {frame!r}{pixels}: record the camera info of those"
-                    f" images, or name it in setup.topics.{role}_info"
+                    f" pixels, {image.name} of {frame!r}, {image.size[0]} x {image.size[1]}: record"
+                    f" the camera info of those images, or name it in setup.topics.{role}_info"
                 )
         if not fitting:
             return None
         own, _, _, best = max(fitting, key=lambda entry: entry[:3])
         return replace(best, why=f"{'beside' if own else 'of the frame and size of'} {image.name}")
+
+
+def _hinted(role: Role, topic: Topic) -> bool:
+    words = _words(topic.name)
+    return any(h in words or (len(h) > 3 and h in topic.name.lower()) for h in role.hints)
 
 
 def _type(topic: Topic) -> str:
@@ -347,18 +345,20 @@ def _joint_names(topic: Topic) -> list[str]:
     return names
 
 
-def _pictures(role: str, topic: Topic, named: bool) -> Choice | None:
-    """Pictures that are colour or depth, as the role asks, and of a kind that can be decoded."""
-    choice = Choice(topic, _all(topic, "picture"))
-    picture = choice.typical.value
-    if not named and images.is_depth(picture) != (role == "depth"):
-        if role == "depth" and picture.encoding and "depth" in topic.name.lower():
-            what = f"encoding {picture.encoding!r} is no depth, {images.USE}"
-            raise UserError(f"{topic.name}: {what}")
-        return None
-    if problem := _undecodable(role, choice):
-        raise UserError(f"{topic.name}: {problem}")
-    return choice
+def _pictures(role: str, topic: Topic) -> Choice:
+    """Pictures of which one of some can be decoded to what the role asks for. Raises UserError."""
+    choice, reasons = Choice(topic, _all(topic, "picture")), []
+    pictures = choice.readings
+    for k in np.unique(np.linspace(0, len(pictures) - 1, TRIES).astype(int)) if pictures else ():
+        try:
+            height, width = getattr(images, role)(pictures[k].value).shape[:2]
+        except images.Undecodable as error:
+            reasons.append(str(error))
+        else:
+            return replace(choice, size=(width, height))
+    if not reasons:
+        return choice  # without a readable message
+    raise UserError(f"{topic.name}: its pictures cannot be decoded: {reasons[0]}")
 
 
 def _gripper(topic: Topic, named: bool) -> Choice | None:
@@ -367,8 +367,7 @@ def _gripper(topic: Topic, named: bool) -> Choice | None:
     fingers = [name for name in names if _is_finger(name)]
     if not fingers and not named and not _is_finger(topic.name):
         return None
-    only = [name for name in fingers if "finger" in name.lower()]
-    moving = tuple(only or fingers or names)
+    moving = tuple(fingers or names)
     convert = partial(opening_of, topic=topic.name, names=moving)
     return Choice(topic, _joints(topic, moving), convert=convert)
 
@@ -394,9 +393,7 @@ def opening_of(values: np.ndarray, topic: str, names: tuple[str, ...]) -> np.nda
 def _arm(topic: Topic, setup: SetupParams) -> Choice:
     """Joint states through params' URDF."""
     names = [name for name in _joint_names(topic) if not _is_finger(name)]
-    if not names:
-        raise UserError(f"{topic.name} has the joints of fingers alone")
-    has = few(names, SHOWN)
+    has = few(names, SHOWN) or "of fingers alone"
     if setup.urdf is None:
         raise UserError(
             f"{topic.name} has the joints {has}: put the robot's URDF into robots/ and name it in"
@@ -456,26 +453,6 @@ def _hand(topic: Topic, setup: SetupParams, still: TransformTree) -> Choice:
         return Reading(reading.stamp, up[-1], tuple(pose.pose()))
 
     return Choice(topic, _mapped(topic, "transforms", read))
-
-
-def _size(image: Choice) -> tuple[int, int] | None:
-    """Width and height that most of the first pictures tell."""
-    read = [images.size_of(reading.value) for reading in image.readings[:TRIES]]
-    sizes = Counter(size for size in read if size)
-    return sizes.most_common(1)[0][0] if sizes else None
-
-
-def _undecodable(role: str, choice: Choice) -> str | None:
-    """Why none of some pictures of a topic can be decoded; None where one can."""
-    pictures, reasons = choice.readings, []
-    for k in np.unique(np.linspace(0, len(pictures) - 1, TRIES).astype(int)):
-        try:
-            getattr(images, role)(pictures[k].value)
-        except images.Undecodable as error:
-            reasons.append(str(error))
-        else:
-            return None
-    return f"its {COLOUR[role]} pictures cannot be decoded: {reasons[0]}"
 
 
 def _source(topic: str) -> str:

@@ -155,17 +155,17 @@ def limited(launches: Launches, max_force: float) -> Launches:
 def landing_gradient(
     land: Callable[[np.ndarray], np.ndarray], draws: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Landings (N,) [m] of draws (N, 2) [m], and how they change with the draw, shape (N, 2).
+    """Landings (N, ...) [m] of draws (N, 2) [m], and how they change with the draw, (N, ..., 2).
 
     By central differences, all in one batch.
 
     Args:
-        land: Landings (M,) [m] of draws (M, 2) [m], NaN where one fails.
+        land: Landings (M, ...) [m] of draws (M, 2) [m], or more of each; NaN where one fails.
     """
-    landing = land((draws[:, None] + CENTRAL_DIFFERENCES_M).reshape(-1, 2)).reshape(
-        len(draws), len(CENTRAL_DIFFERENCES_M)
-    )
-    return landing[:, 0], (landing[:, 1::2] - landing[:, 2::2]) / (2 * NUDGE_M)
+    landing = land((draws[:, None] + CENTRAL_DIFFERENCES_M).reshape(-1, 2))
+    landing = landing.reshape(len(draws), len(CENTRAL_DIFFERENCES_M), *landing.shape[1:])
+    change = (landing[:, 1::2] - landing[:, 2::2]) / (2 * NUDGE_M)
+    return landing[:, 0], np.moveaxis(change, 1, -1)
 
 
 def outcomes(

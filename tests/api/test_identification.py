@@ -6,8 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sling2sim2real import Identification, Observed, aim, identify, launch
+from sling2sim2real import (
+    Identification,
+    Observed,
+    aim,
+    episode_from_arrays,
+    identify,
+    launch,
+    rehearse,
+)
 from sling2sim2real.base.errors import UserError
+from sling2sim2real.card.verdict import DISAGREE
 from sling2sim2real.identification.posterior.launches import TAPE
 
 FITTED = "youngs_modulus", "elasticity_damping", "mooney_share", "relaxation"
@@ -46,6 +55,27 @@ def test_launches_move_what_is_found(band, settings, world, episode, identificat
     assert before - 0.1 - TAPE < launch(after, draw).landing < before - 0.02
     wide, narrow = (np.ptp(aim(result, 2.0).interval_90) for result in (identification, after))
     assert narrow < wide
+
+
+def test_a_poor_recording_beside_a_good_one_makes_nothing_worse(band, settings, world) -> None:
+    """One with dips; and one by the paper's pull without pictures of the recoil."""
+    arrays = rehearse(world, seed=1)
+    after = arrays["cloud_time"] > arrays["release_time"]
+    clouds = [
+        cloud[: 0 if late else None] for cloud, late in zip(arrays["clouds"], after, strict=True)
+    ]
+    poor = episode_from_arrays(**arrays | {"clouds": clouds})
+    good = episode_from_arrays(**rehearse(world, dips=True, seed=2))
+    found = [
+        identify(episodes, band, settings=settings, start=world)
+        for episodes in ([good], [poor], [good, poor], [poor, good])
+    ]
+    alone, worse, *together = [np.ptp(aim(it, 2.0).interval_90) for it in found]
+    assert worse > 1.5 * alone
+    chance = 1.15  # of an interval by 200 samples
+    for it, width in zip(found[2:], together, strict=True):
+        assert width < chance * alone
+        assert it.settled and it.confidence["disagreement"] < DISAGREE
 
 
 def test_what_is_saved_is_loaded(identification, tmp_path) -> None:

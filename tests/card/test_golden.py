@@ -42,7 +42,12 @@ def inputs(summary) -> CardInputs:
     metadata = summary.episode.metadata | {"cautions": [caution]}
     known = deepcopy(summary.confidence)
     known["parameters"]["mooney_share"] |= {"prior": [-0.24, 0.84], "identifiable": False}
-    known["launches"] = [{"draw": [-0.3, -0.2], "landing": 1.9, "left": 0.01, "z_without_it": 0.5}]
+    told = {
+        "measured": {"landing": 1.9},
+        "left": {"landing": 0.01},
+        "z_without_it": {"landing": 0.5},
+    }
+    known["launches"] = [{"draw": [-0.3, -0.2], **told}]
     return replace(
         summary,
         found=replace(summary.found, confidence=known),

@@ -68,7 +68,7 @@ CASES = [
     ),
     ({"bias": -0.02, "bias_error": 0.004, "bias_of_half": -0.5}, CARE, "landed 2.0 % short"),
     ({"bias": 0.03, "bias_error": 0.004, "bias_of_half": 0.6}, CARE, "landed 3.0 % long"),
-    ({"observed": 1, "surprising": 1}, CARE, "1 of 1 launch used for the fit landed outside"),
+    ({"observed": 1, "surprising": 1}, CARE, "1 of 1 launch used for the fit lie outside"),
     ({"carried": 0.1}, CARE, "was 0.1 times"),
     ({"carried": 1.7}, CARE, "was 1.7 times"),
 ]
@@ -167,7 +167,12 @@ def test_findings_tell_what_was_odd_of_a_recording(summary) -> None:
 
 def test_findings_see_a_bad_score_a_side_and_odd_evidence(summary) -> None:
     rows = trials().assign(landing_y=[1.5, 2.1])
-    launches = [{"left": None, "z_without_it": None}, {"left": -0.07, "z_without_it": -1.8}]
+    launches = [
+        {"left": {"landing": None}, "z_without_it": {"landing": None}},
+        {"left": {"landing": -0.07}, "z_without_it": {"landing": -1.8}},
+        {"left": {"landing": 0.01, "speed": -0.02}, "z_without_it": {"landing": 0, "speed": -1.8}},
+        {"left": {"speed": -0.02, "angle": 0.3}, "z_without_it": {"speed": 1, "angle": -2.1}},
+    ]
     recordings = [
         {"force_rms": force, "held_rms": 0, "recoil_rms": 0, "pictures": []}
         | {"source": {"file": f"{force}.mcap", "pull": 3}, "misfit_without": force}
@@ -178,7 +183,7 @@ def test_findings_see_a_bad_score_a_side_and_odd_evidence(summary) -> None:
     found = replace(summary.found, theta=theta, confidence=confidence)
     result = findings(replace(summary, launched=rows, found=found))
     assert (result.outside, result.left, result.force) == (1, 0.07, 0.3)
-    assert (result.observed, result.surprising) == (1, 1)
+    assert (result.observed, result.surprising) == (3, 2)
     assert result.bias == pytest.approx(np.mean([1.5 / 1.92, 2.1 / 2.08]) - 1)
     assert result.bias_of_half == pytest.approx(np.mean([-4.2, 0.2]))
     assert result.density == pytest.approx(summary.params.bands[summary.band].density)

@@ -67,6 +67,8 @@ def test_a_command_line_that_makes_no_sense(refused) -> None:
         ("check a.mcap --diameter 10", "argument --diameter: must be in metres, from 0.0005"),
         ("launch b --draw=-2.30,0", "from 0.05 to 2, got 2.3"),
         ("observe b --draw=-0.3,-0.2 --landing 221", "looks like centimetres (2.21)"),
+        ("observe b --draw=-0.3,-0.2 --speed 500", "must be in m/s, from 0.1 to 100, got 500"),
+        ("observe b --draw=-0.3,-0.2 --angle 95", "must be in degrees, from -90 to 90, got 95"),
         ("plan b --rate 1e9", "argument --rate: must be in hertz, from 1 to 10000"),
         ("export b --to unity", "invalid choice: 'unity'"),
     ):
@@ -87,6 +89,8 @@ def test_a_users_mistake(tmp_path: Path, refused, fitted) -> None:
         ("launch bands/toy --draw=-0.30,-0.60", "draw: must be (y, z) with y < 0 and z > -0.52"),
         ("launch bands/toy --theta none.json --draw=-0.3,-0.1", "none.json: missing"),
         ("observe bands/toy --draw=-0.3,-0.6 --landing 2", "lies below the floor"),
+        ("observe bands/toy --draw=-0.3,-0.2 --angle 40", "--landing: is missing"),
+        ("observe bands/toy --draw=-0.3,-0.2 --speed 5 --check", "only a launch to fit may have"),
         ("plan bands/toy --rest-length 0.5", "has the band's sizes: leave these out"),
         ("check bands/toy --mass 0.04", "has the band's sizes: leave these out"),
         ("check seen.mcap --sheet none/out.png", "there is no folder none"),
@@ -99,7 +103,7 @@ def test_a_band_that_is_not_identified_yet_says_how(tmp_path: Path, refused) -> 
     folder = tmp_path / "bands/mine"
     folder.mkdir(parents=True)
     sizes = {"mass": 0.02, "diameter": 0.01, "rest_length": 0.5}
-    BandFile(sizes).save(folder / "band.yaml")
+    BandFile(**sizes).save(folder / "band.yaml")
     for command in ("aim bands/mine --target 1.9", "export bands/mine --to mjcf"):
         line = refused(1, *command.split(), folder=tmp_path)
         assert line.endswith("mine is not identified yet: `sling fit bands/mine`")

@@ -1,5 +1,6 @@
 """`sling observe`: a launch is written down once, learned from, and the card made again."""
 
+import numpy as np
 import pytest
 
 from sling2sim2real import Identification, UserError
@@ -12,7 +13,7 @@ __all__ = ["no_recording_is_read"]
 DRAW = (-0.30, -0.15)
 
 
-def row(landing: float, **more) -> LaunchRow:
+def row(landing: float | None, **more) -> LaunchRow:
     return LaunchRow(DRAW, more.pop("error", None), landing, **more)
 
 
@@ -40,6 +41,20 @@ def test_a_launch_moves_the_prediction_and_the_card(copied, no_recording_is_read
     assert held["after"] == again["after"] and held["use"] == "check"
     (doubt,) = held["warnings"]
     assert doubt["about"] == "miss" and "lies outside the predicted interval" in doubt["what"]
+
+
+def test_a_speed_is_evidence_beside_the_landing_or_alone(copied, no_recording_is_read) -> None:
+    """Half the energy that was predicted: the share that launches return falls."""
+    fast = row(None, error=0.001, speed=3.3, angle=40.0)
+    done = observe(BandFolder(TOY), fast)
+    before, after = done["before"], done["after"]
+    assert after["speed"] < before["speed"]
+    assert after["returned_share"] < before["returned_share"]
+    (entry,) = Identification.load(TOY).confidence["launches"]
+    assert entry["measured"] == {"speed": 3.3, "angle": pytest.approx(np.deg2rad(40.0))}
+    assert abs(entry["left"]["speed"]) < 0.02 and entry["z_without_it"]["speed"] < 0
+    assert shown(done).endswith("measured  3.30 m/s, 40.0 degrees")
+    assert read_launches(TOY / "launches.csv") == [fast]
 
 
 def test_a_retry_goes_on(copied, monkeypatch) -> None:

@@ -40,22 +40,29 @@ def test_launches_are_read_as_spreadsheets_write_them(tmp_path) -> None:
 
 def test_what_is_written_is_read(tmp_path) -> None:
     rows = [LaunchRow((-0.3, -0.1), None, 1.9), LaunchRow((-0.2, 0.1), 0.01, None, "check")]
-    write_launches(tmp_path / "a.csv", rows)
-    assert read_launches(tmp_path / "a.csv") == rows
+    fast = LaunchRow((-0.3, -0.1), None, None, speed=5.1, angle=-2.0)
+    aimed = LaunchRow((-0.3, -0.1), None, 1.9, "check", 1.925, "ours")
+    for more, names in (([], ""), ([fast], "speed,angle"), ([fast, aimed], "target,method")):
+        write_launches(tmp_path / "a.csv", [*rows, *more])
+        assert read_launches(tmp_path / "a.csv") == [*rows, *more]
+        assert (tmp_path / "a.csv").read_text().splitlines()[0].endswith(names or HEAD)
+    assert not fast.equals(rows[0]) and fast.equals(fast)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("draw_y,draw_z\n-0.3,-0.1\n", "lacks the column landing"),
-        (f"{HEAD},speed\n", "unknown column 'speed'"),
+        (f"{HEAD},pace\n", "unknown column 'pace'"),
+        (f"{HEAD},speed\n-0.3,-0.1,,,,-5\n", "line 2: speed must lie from 0 to 100 m/s"),
+        (f"{HEAD},speed,angle\n-0.3,-0.1,,,,5,95\n", "line 2: angle must lie from -90 to 90 deg"),
         (f"{HEAD},landing\n", "two columns landing"),
         ("", "lacks the column draw_y"),
         (f"{HEAD}\n-0.3,-0.1,,far,fit\n", "line 2: landing must lie from 0 to 20 m"),
         (f"{HEAD}\n-0.3,-0.1,,1,\n-0.3,,,1,\n", "line 3: a launch needs draw_y and draw_z"),
         (f"{HEAD}\n0.3,-0.1,,1,\n", "line 2: draw_y must lie from -20 to 0 m"),
         (f"{HEAD}\n-0.3,-0.1,0.2,1,\n", "line 2: error must lie from 0 to 0.1 m"),
-        (f"{HEAD}\n-0.3,-0.1,,,fit\n", "line 2: a launch that did not land is no evidence"),
+        (f"{HEAD}\n-0.3,-0.1,,,fit\n", "line 2: a launch that did not land, without a speed,"),
         (f"{HEAD}\n-0.3,-0.1,,1,score\n", "line 2: use must be fit or check, got 'score'"),
         (f"{HEAD}\n-0.3,-0.1,,1,fit,9\n", "line 2: more cells than the 5 columns"),
         (f"{HEAD},method\n-0.3,-0.1,,1,fit,ours\n", "line 2: a launch that a policy aimed is to"),

@@ -22,7 +22,7 @@ from validation.recordings.bag import Truth, write_bag
 @pytest.fixture(scope="session")
 def params() -> Params:
     """The project's parameters with a window that suits the small recordings."""
-    whole = load(DEFAULTS)
+    whole = with_(load(DEFAULTS), "bands.band1", diameter=0.010)  # as the small bags have it
     return with_(whole, "episode", duration=3.6, samples=120, tail=0.5)
 
 

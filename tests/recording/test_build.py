@@ -9,11 +9,10 @@ import pytest
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.episode import Episode
-from sling2sim2real.recording.build import build_episodes, episode_of, process
+from sling2sim2real.recording.build import build_episodes
 from sling2sim2real.recording.signals import signals_of
-from sling2sim2real.recording.streams import read_recording
 from tests.project import with_
-from tests.recording.conftest import part_of, processed_of, pull_of
+from tests.recording.conftest import processed_of, pull_of
 from validation.recordings.bag import EYE, Truth, blind_bag, edit, scores
 
 
@@ -91,14 +90,3 @@ def test_bytes_are_reproducible_and_come_back(episode, seen, params, tmp_path) -
     np.testing.assert_array_equal(back.clouds[50], episode.clouds[50])
     assert back.metadata == json.loads(json.dumps(episode.metadata))
     assert back.metadata["input"]["topics"]["wrench"] == "/ft/wrench"
-
-
-def test_a_late_camera_is_put_right_and_it_is_said(episode, seen, params) -> None:
-    recording = read_recording(seen[0], params.setup).shifted(camera=-0.015)
-    done = process(part_of(recording, params), params.bands["band1"], params)
-    late = episode_of(done, "band1").metadata["preprocessing"]["delays"]
-    assert late["camera"]["applied"] and late["camera"]["source"] == "estimated"
-    assert late["camera"]["value"] == pytest.approx(0.015, abs=1e-3)
-    assert not late["pose"]["applied"] and 0 < late["pose"]["left"] < 0.002
-    assert late["camera"]["against"] == "pose"
-    np.testing.assert_allclose(done.whole.clouds.time, episode.cloud_time, atol=1e-3)

@@ -1,23 +1,21 @@
-"""Clocks: offsets, steps and drifts that were put in are refused or said; good ones are left."""
+"""Clocks, bursts and held values that were put in are mended, refused or said."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sling2sim2real.base.errors import UserError
+from sling2sim2real.recording import pace
 from sling2sim2real.recording.checks import of_topics
 from sling2sim2real.recording.delays import correct_delays
 from sling2sim2real.recording.messages import NO_SCHEMA, Reading, Topic
-from sling2sim2real.recording.streams import (
-    Recording,
-    Stream,
-    course_of,
-    read_recording,
-    streams_of,
-)
+from sling2sim2real.recording.streams import Recording, Stream, drift_of, read_recording, streams_of
 from sling2sim2real.recording.topics import Choice
 from tests.project import with_
 from tests.recording.conftest import part_of, pull_of
@@ -87,24 +85,23 @@ def test_a_topic_without_stamps_is_refused() -> None:
         stream_of(np.zeros(50, int), topic(50.0, 1.0)[1])
 
 
-@pytest.mark.parametrize("rate", [-3e-3, 0.0, 5e-4])
-def test_a_drift_is_told_by_the_least_delays(rate) -> None:
+@pytest.mark.parametrize(
+    ("rate", "step"), [(0, 0), (-3e-3, 0), (5e-4, 0), (0, -0.06), (0, 0.005), (0, 0.06)]
+)
+def test_a_drift_or_a_step_is_told_by_the_least_delays(rate, step) -> None:
+    """Of a drift most: the first part's mean is compared with the last one's."""
+    whole = 9 * rate + step
     for seed in range(5):
         stamp, log = topic(1000.0, 9.0, seed=seed)
         odd = START + np.round((stamp - START) * (1 + rate)).astype(np.int64)
-        clock = course_of(odd, log, *topic(1000.0, 9.0, seed=seed + 10))
-        assert clock.change == pytest.approx(9 * rate, abs=max(5 * clock.error, 2e-4))
-        assert clock.step is None or abs(clock.change) < 2e-4
-    assert course_of(stamp[:1000], log[:1000], stamp, log).error == np.inf
-
-
-@pytest.mark.parametrize("size", [-0.06, 0.005, 0.06])
-def test_a_step_is_no_drift(size) -> None:
-    stamp, log = topic(1000.0, 9.0, seed=3)
-    stamp[4000:] += round(1e9 * size)
-    clock = course_of(stamp, log, *topic(1000.0, 9.0))
-    assert clock.step == 4 and clock.change == pytest.approx(size, rel=0.05)
-    assert clock.error < 0.001
+        odd[4000:] += round(1e9 * step)
+        force, received = topic(1000.0, 9.0, seed=seed + 10)
+        topics = SimpleNamespace(stamp=odd), log, SimpleNamespace(stamp=force), received
+        change, error = drift_of(*topics)
+        assert abs(change - whole) < 0.2 * abs(whole) + 2e-4
+        assert not whole or abs(change) > 4 * error
+    short = SimpleNamespace(stamp=odd[:1000]), log[:1000], *topics[2:]
+    assert drift_of(*short) == (0.0, np.inf)
 
 
 def read(folder, params, **options) -> Recording:
@@ -170,7 +167,7 @@ def test_a_step_in_one_topic_is_refused_by_its_name(tmp_path, params, kind) -> N
     found = [*of_topics(part_of(read_recording(path, params.setup), params))]
     words = [str(finding) for finding in found if finding.about == "clock" and finding.refused]
     topics = {"wrench": "/arm/current_pose", "pose": "/arm/current_pose", "depth": "/camera/depth"}
-    assert any(topics[kind] in what and "steps by" in what for what in words)
+    assert any(topics[kind] in what and "drifts or steps by" in what for what in words)
 
 
 def test_the_machine_clock_that_is_set_back_is_refused(tmp_path, params) -> None:
@@ -205,3 +202,87 @@ def test_a_given_delay_is_taken_off_first(tmp_path, params, good, late) -> None:
         np.testing.assert_array_equal(
             right.recording.depth.stamp, recording.depth.stamp
         )  # not twice
+
+
+MS = 1_000_000
+
+
+def samples(count: int = 4000, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """True times of a 1 kHz sensor [ns], and its noisy values."""
+    random = np.random.default_rng(seed)
+    return 10**18 + np.arange(count) * MS, random.normal(size=(count, 3))
+
+
+@given(
+    size=st.one_of(st.integers(2, 40), st.sampled_from([64, 250])),
+    width=st.sampled_from([0, 8_000, 60_000]),
+    late=st.sampled_from([0, 200_000]),
+    lost=st.lists(st.integers(10, 90), max_size=3),
+    seed=st.integers(0, 99),
+)
+def test_bursts_are_spread_back_to_where_samples_were_taken(size, width, late, lost, seed) -> None:
+    """Whatever their size, with a jitter of the reader, and where whole bursts are lost."""
+    true, values = samples(seed=seed)
+    random = np.random.default_rng(seed)
+    burst = np.arange(len(true)) // size
+    end = np.array([true[burst == k][-1] for k in range(burst[-1] + 1)])
+    end = end + random.integers(0, late + 1, len(end))
+    stamp = end[burst] + (np.arange(len(true)) % size) * min(width, MS // 8 // size)
+    retained = ~np.isin(burst, [number * (burst[-1] // 100) for number in lost])
+    stamp, true, values = stamp[retained], true[retained], values[retained]
+    even, bursts = pace.without_bursts("/x", stamp, stamp + 100_000, values)
+    assert bursts.count == size
+    whole = slice(size, len(true) - size)
+    assert np.abs(even - true)[whole].max() < MS / 2 + 1.5 * late
+    assert np.all(np.diff(even) > 0)
+
+
+def test_a_coarse_clock_is_refused() -> None:
+    true, values = samples()
+    with pytest.raises(UserError, match="/x: its clock ticks every 10 ms only"):
+        pace.without_bursts("/x", true // (10 * MS) * (10 * MS), true + 150_000, values)
+
+
+@given(
+    rate=st.sampled_from([30.0, 100.0, 1000.0]),
+    jitter=st.floats(0, 0.3),
+    lost=st.floats(0, 0.5),
+    seed=st.integers(0, 999),
+)
+def test_even_stamps_are_left(rate, jitter, lost, seed) -> None:
+    random = np.random.default_rng(seed)
+    stamp = np.arange(3000) / rate + jitter / rate * random.uniform(-1, 1, 3000)
+    stamp = np.sort(np.round(1e9 * stamp[random.random(3000) >= lost]).astype(np.int64))
+    values = random.normal(size=(len(stamp), 3))
+    assert pace.without_bursts("/x", stamp, stamp, values) is None
+    assert pace.hold_of(stamp, values) is None
+
+
+def test_doubled_messages_are_no_bursts() -> None:
+    true, values = samples()
+    twice = np.repeat(true, 2)
+    assert pace.without_bursts("/x", twice, twice + 1000, np.repeat(values, 2, axis=0)) is None
+
+
+@given(times=st.integers(2, 60), jitter=st.floats(0, 0.2), rests=st.booleans())
+def test_held_values_are_taken_once(times, jitter, rests) -> None:
+    """Also of a hand that rests, without noise, half of the time."""
+    count = 6000
+    random = np.random.default_rng(times)
+    stamp = np.round(MS * (np.arange(count) + jitter * random.uniform(-1, 1, count))).astype(int)
+    source = np.arange(count) // times * times
+    path = np.where(rests & (source < count // 2), 0.0, (source - count / 2) ** 2)
+    values = np.stack([path, 0 * path], axis=1)
+    hold = pace.hold_of(stamp, values)
+    assert hold == pytest.approx(times * MS, rel=0.02)
+    retained = pace.first_of_each(stamp, values, hold)
+    moving = np.flatnonzero(retained & (np.arange(count) > count // 2 + times))
+    np.testing.assert_array_equal(moving % times, 0)
+    assert np.diff(stamp[retained]).max() < 2.5 * times * MS  # a rest is no gap
+
+
+def test_a_coarse_encoder_is_not_held() -> None:
+    """It steps by its resolution, at a pace that goes with the speed."""
+    t = np.arange(5000)
+    path = np.round(400 * np.sin(t / 900)) / 400
+    assert pace.hold_of(t * MS, path[:, None]) is None

@@ -42,3 +42,11 @@ def test_a_small_return_error_is_no_drift_either() -> None:
     """1.7 % of what was held, which would make a modulus 2 % too small."""
     assert not course(lambda t: 0.24 * (t > 8)).steady
     assert course(lambda t: 0.24 * t / 10).steady
+
+
+def test_a_drift_that_the_free_hand_is_too_short_to_show_is_not_taken_out() -> None:
+    """A quarter of a second at both ends tells neither a drift nor a zero that does not return."""
+    for shape in (lambda t: 0.5 * t / 10, lambda t: 0.5 * (t > 8)):
+        force = made() + shape(T)[:, None] * WAY
+        drift = drift_of(T, force, (T > 0.7) & (T < 0.95), (T > 8.4) & (T < 8.65), 14.0)
+        assert not drift.steady and not drift.rate.any()

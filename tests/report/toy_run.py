@@ -10,7 +10,7 @@ import pandas as pd
 from pipeline.layout import Layout
 from pipeline.params import Params, load
 from pipeline.params.run import RunParams
-from sling2sim2real.base.launches_file import COLUMNS, MORE
+from sling2sim2real.base.launches_file import AIMED, COLUMNS
 from sling2sim2real.identification.searches.regions import Region, save_regions
 from sling2sim2real.settings.identification import LAWS
 from sling2sim2real.simulator.parameters import THETA as NAMES
@@ -99,7 +99,7 @@ def write_run(root: Path) -> None:
     card = json.loads(file.read_text())
     card["training"] |= {"converged": False, "failed_targets": 2}
     file.write_text(json.dumps(card))
-    text = f"{','.join((*COLUMNS, *MORE))}\n-0.3,-0.2,,1.9,check,1.9,bo\n"
+    text = f"{','.join((*COLUMNS, *AIMED))}\n-0.3,-0.2,,1.9,check,1.9,bo\n"
     layout.launches(BAND).write_text(text)
     launches([[0.01, -0.01]] * 3).to_parquet(layout.trials(pairs[f"{DIPS}-{OURS}"]))
     layout.floor("band1").parent.mkdir()
@@ -125,6 +125,11 @@ def theta(band: str, method: str) -> dict:
     return content | {"loss": loss, "theta": THETA | {"damping_scale": 0.999}}
 
 
+def _launch(draw: list[float], landing: float, left: float | None, z: float | None) -> dict:
+    values = {"measured": landing, "left": left, "z_without_it": z}
+    return {"draw": draw} | {name: {"landing": value} for name, value in values.items()}
+
+
 def _confidence(band: str) -> dict:
     """Of band1 with all that there is, of band2 in doubt, of BAND as simple as can be."""
     known = confidence()
@@ -141,7 +146,7 @@ def _confidence(band: str) -> dict:
     second = known["recordings"][0] | {"source": {"file": "a|b`c*.mcap", "pull": 2}}
     second |= {"pictures": [0.0123, 0.0456], "misfit_without": 3.21}
     evidence = [
-        {"draw": [-0.3, -0.15], "landing": 1.9, "left": 0.021, "z_without_it": 0.5},
-        {"draw": [-0.3, -0.16], "landing": 2.0, "left": None, "z_without_it": None},
+        _launch([-0.3, -0.15], 1.9, 0.021, 0.5),
+        _launch([-0.3, -0.16], 2.0, None, None),
     ]
     return known | {"recordings": [*known["recordings"], second], "launches": evidence}

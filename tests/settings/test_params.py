@@ -93,8 +93,13 @@ def test_every_text_refuses_a_number() -> None:
 
 
 def test_the_file_has_every_key_of_the_library_and_its_default() -> None:
-    """The defaults live in the models, which are no stage's dependency; DVC tracks the file."""
+    """The defaults live in the models, which are no stage's dependency; DVC tracks the file.
+
+    One value is the experiment's own: the order of a cloud's filters, as the paper has it.
+    """
     content = Settings.default().model_dump(mode="json", exclude={"bands", "methods"})
+    assert content["cloud"]["sampling"] == "after_filters"
+    content["cloud"]["sampling"] = "before_filters"
     assert not any(content["setup"]["topics"].values())
     content["setup"]["topics"] = {}  # all are found
     delivered = {key: CONTENT[key] for key in content}

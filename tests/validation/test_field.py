@@ -26,6 +26,13 @@ def test_a_value_is_right_within_its_limits_and_interval() -> None:
     assert not is_right(sound, summary(2e5, 4e-3, width=0.9))
 
 
+def test_a_wrong_fit_that_did_not_settle_is_not_silent() -> None:
+    assert field.outcome_of(right=True, settled=False, found=False) == CORRECT
+    assert field.outcome_of(right=False, settled=False, found=False) == field.CAUTIONED
+    assert field.outcome_of(right=False, settled=True, found=True) == field.MISNAMED
+    assert field.outcome_of(right=False, settled=True, found=False) == SILENT
+
+
 def test_a_bag_is_written_as_it_was_read(blind, tmp_path) -> None:
     bag = Bag.read(blind[0])
     bag.write(tmp_path / "again.mcap")

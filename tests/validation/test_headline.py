@@ -46,12 +46,12 @@ def test_a_difference_is_claimed_only_where_all_bands_agree(same) -> None:
 
 
 def test_dips_are_those_of_new_bands_without_a_launch() -> None:
-    line = {"method": POSTERIOR, "pull": "informative", "worn": False, "launched": False}
+    line = {"method": POSTERIOR, "pull": "informative", "launched": False}
     scores = {"error": (0.01 / TARGETS).tolist()}
     lines = [
         line | {"band": band, "scores": scores} | change
         for band in headline.BANDS
-        for change in ({}, {"worn": True}, {"launched": True}, {"method": PAPER}, {"failed": "no"})
+        for change in ({}, {"launched": True}, {"method": PAPER}, {"failed": "no"})
     ]
     each = headline.dips(lines)
     assert [values.tolist() for values in each.values()] == [pytest.approx([1.0])] * 3

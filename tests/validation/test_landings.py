@@ -22,26 +22,21 @@ from validation.projects import DEFAULTS
 from validation.rubbers import DEVELOP, SEALED, UNSEEN_LAWS, rubbers
 
 
-def test_each_band_is_recorded_by_both_pulls_and_once_after_it_was_drawn() -> None:
-    for name, (seed, bands, count, states) in SETS.items():
+def test_each_band_is_recorded_by_each_pull_and_compared_by_its_first_recording() -> None:
+    for name, (seed, bands, numbers, pulls) in SETS.items():
         every = jobs(name)
         assert len(set(every)) == len(every) and {job.seed for job in every} == {seed}
         other = [job for job in every if job.launched or job.method != POSTERIOR]
-        assert {job.kind for job in other} == {
+        compared = {
             "paper, virgin, the paper's method",
             "informative, virgin, the paper's method",
             "informative, virgin, one launch",
         }
-        assert len(other) == 3 * len(bands) and {job.number for job in other} == {0}
-        every = [job for job in every if job not in other]
-        virgin = [job for job in every if not job.worn]
-        assert len(virgin) == 2 * count * len(bands)
-        assert len(every) - len(virgin) == 2 * len(bands) * (True in states)
-    job = OneRecording(DEVELOP, "develop1", "informative", True, 0)
-    assert (
-        job.params.rig.recordings["plain"].pull == "informative"
-        and job.params.bands["develop1"].preconditioned
-    )
+        assert {job.kind for job in other} == (compared if 0 in numbers else set())
+        assert len(other) == len(bands) * len({job.kind for job in other})
+        assert len(every) - len(other) == len(pulls) * len(numbers) * len(bands)
+    job = OneRecording(DEVELOP, "develop1", "informative", 0)
+    assert job.params.rig.recordings["plain"].pull == "informative"
 
 
 def test_half_of_the_sealed_rubbers_soften_by_laws_that_none_was_developed_on() -> None:
@@ -52,7 +47,7 @@ def test_half_of_the_sealed_rubbers_soften_by_laws_that_none_was_developed_on() 
     assert 2 * sum(rubber["softening"] is not None for _, rubber in sealed.values()) == len(sealed)
 
 
-JOB = vars(OneRecording(DEVELOP, "a", "paper", False, 0)) | {"settled": True}
+JOB = vars(OneRecording(DEVELOP, "a", "paper", 0)) | {"settled": True}
 
 
 def scores(error: float, miss: float) -> dict:

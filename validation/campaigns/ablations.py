@@ -1,7 +1,6 @@
 """Ablations and baselines on new recordings of the virtual rig, with error bars.
 
-    python -m validation.campaigns.ablations --workers 16
-    python -m validation.campaigns.ablations --preset large --work FOLDER --report FILE
+    python -m validation.campaigns.ablations --preset large --recordings 3 --seeds 3
 
 Recordings have rig seeds from 1001 on, which took part in no choice. Every method identifies each
 with one search seed, and the first of each band with five. What it found is aimed at the targets of
@@ -32,6 +31,7 @@ from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.settings import expect_known
 from sling2sim2real.settings.identification import MethodParams
+from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import aimed, recorded, sling_of
 from validation.campaigns.runner import PAPER
@@ -43,7 +43,6 @@ from validation.reports import row, write_report
 
 WORK = Path("data/ablations")
 REPORT = Path("reports/validation/ablations.json")
-LARGE = Path("reports/validation/ablations-large.json")
 FIRST, SEEDS = 1001, 5  # rig seed of the first recording; search seeds on it
 
 
@@ -93,7 +92,7 @@ def record(where: tuple[str, int], work: Path) -> None:
 
 @cache  # in each process
 def _params(method: str, preset: str | None) -> Params:
-    return with_variants(with_preset(load(), method, preset))
+    return with_preset(with_variants(load()), method, preset)
 
 
 def aimed_and_launched(job: Job, work: Path, preset: str | None) -> dict:
@@ -261,9 +260,7 @@ WORDS = {  # of the table
     "adam": "Adam_L",
     "package_si": "Package SI",
     "real2sim2real": "Real2Sim2Real",
-    "search_rubber": "the law `rubber`",
-    "geom_quarter": "geometry weighs a quarter",
-    "late": "late frames weigh little",
+    NEO_HOOKEAN: "the neo-Hookean law",
 }
 
 
@@ -276,8 +273,8 @@ def table(content: dict) -> list[str]:
     same, budgets = content["rank_correlation_of_loss_and_miss"]["methods"], content["settings"]
     heads = ("method", "rollouts", "its loss", "misses by [cm]", *bands, "bands where nearer")
     rows = [row(*heads), row("---", *["---:"] * (len(heads) - 1))]
-    for method, words in WORDS.items():
-        of = figures["all"]["methods"][method]
+    for method in filter(figures["all"]["methods"].__contains__, WORDS):
+        words, of = WORDS[method], figures["all"]["methods"][method]
         loss = f"{of['loss']['mean']:.3f}"
         cells = [words, f"{budgets['rollouts'][method]:,}", loss if method in same else f"({loss})"]
         cells.append(f"{of['miss_cm']['mean']:.1f}")

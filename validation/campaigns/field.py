@@ -5,8 +5,9 @@
 Each fault of validation/recordings/faults.py is done to orange_2 in FOLDER and to a recording of
 the rig, in three sizes. What the checks say of it is kept; where no check of the fault's own
 concern speaks, the band is identified as if nothing were wrong, from the sound recording's values
-on, and compared with them. All sound recordings are checked too: each finding there is a false
-alarm. Results are lines of results.jsonl in --work: a run that was killed goes on from there.
+on, and compared with them; a fit that does not settle says so on the card. All sound recordings are
+checked too: each finding there is a false alarm. Results are lines of results.jsonl in --work: a
+run that was killed goes on from there.
 """
 
 from __future__ import annotations
@@ -156,7 +157,7 @@ def tried(case: Faulty, work: Path, folder: Path | None) -> dict:
     except UserError as error:
         return {"findings": findings, "outcome": REFUSED, "identification": str(error)}
     right = summary(sound)
-    outcome = CORRECT if is_right(right, values) else MISNAMED if findings else SILENT
+    outcome = outcome_of(is_right(right, values), values["settled"], bool(findings))
     return {
         "findings": findings,
         "outcome": outcome,
@@ -164,6 +165,15 @@ def tried(case: Faulty, work: Path, folder: Path | None) -> dict:
         "modulus_error": values["modulus"][0] / right["modulus"][0] - 1,
         "damping_factor": values["damping"][0] / right["damping"][0],
     }
+
+
+def outcome_of(right: bool, settled: bool, found: bool) -> str:
+    """What came of a fit, where no check of the fault's own concern spoke."""
+    if right:
+        return CORRECT
+    if not settled:
+        return CAUTIONED
+    return MISNAMED if found else SILENT
 
 
 def is_right(sound: dict, values: dict) -> bool:

@@ -4,18 +4,18 @@
     python -m validation.campaigns.landings sealed     # once: validation/rubbers.py has the rules
     python -m validation.campaigns.landings bands
 
-Each band is recorded by the paper's pull and by the informative one (`plan.dips`), virgin and as it
-is after an earlier pull, and identified by the default method from that one recording; nine targets
-are scored without launch noise (bias), and one launch each with it (coverage). The first recording
-of each virgin band is also identified by the paper's method, and by ours with a launch measured.
+Each band is recorded by the paper's pull and by the informative one (`plan.dips`), the rig's bands
+by the latter alone, and identified by the default method from that one recording; nine targets are
+scored without launch noise (bias), and one launch each with it (coverage). The first recording of
+each other band is also identified by the paper's method, and by ours with a launch measured.
 Results are lines of results.jsonl in --work: a run that was killed, or whose --minutes were over,
 goes on from there. It writes reports/validation/landings-<set>.json.
 """
 
 from __future__ import annotations
 
+import fcntl
 import re
-import shutil
 import time
 from dataclasses import dataclass
 from functools import partial
@@ -27,7 +27,6 @@ from pipeline.params import Params, load
 from rig.oracle.world import World
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.fingerprint import fingerprint
 from sling2sim2real.identification.posterior.launches import Observed
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import (
@@ -52,8 +51,9 @@ OTHERWISE: tuple[tuple[str, dict], ...] = (  # how the first recording of a band
     ("paper", {"method": PAPER}),
 )
 COMPARED, FIRST = ("informative, virgin", "paper, virgin"), "first recordings"
-STORED = "parameters", "derived", "settled", "steps"  # what is stored of a confidence
-BANDS, TEN = ("band1", "band2", "band3"), 10
+STORED = "parameters", "derived", "settled", "edges", "steps"  # what is stored of a confidence
+BANDS = "band1", "band2", "band3"
+FRESH = range(200, 220)  # recordings of the rig's bands that no choice was made by
 BOOTSTRAP = 2000
 
 
@@ -62,7 +62,6 @@ class OneRecording:
     """A recording of a band, and how it is identified.
 
     Attributes:
-        worn: It was drawn before.
         method: Of params.yaml.
         launched: Whether one launch at the middle target was measured.
     """
@@ -70,7 +69,6 @@ class OneRecording:
     seed: int
     band: str
     pull: str
-    worn: bool
     number: int
     method: str = POSTERIOR
     launched: bool = False
@@ -78,44 +76,47 @@ class OneRecording:
     @property
     def kind(self) -> str:
         """What the figures take together: all recordings of all bands."""
-        parts = [self.pull, "worn" if self.worn else "virgin"]
-        parts += ["the paper's method"] if self.method == PAPER else []
+        parts = [self.pull, "virgin", *(["the paper's method"] if self.method == PAPER else [])]
         return ", ".join([*parts, *(["one launch"] if self.launched else [])])
 
     @property
     def params(self) -> Params:
-        return with_rubbers(load(DEFAULTS), self.seed, self.number, self.pull, self.worn)
+        return with_rubbers(load(DEFAULTS), self.seed, self.number, self.pull)
 
 
 SETS = {
-    "develop": (DEVELOP, tuple(rubbers(DEVELOP)), RECORDINGS, (False, True)),
-    "sealed": (SEALED, tuple(rubbers(SEALED)), RECORDINGS, (False, True)),
-    "bands": (DEVELOP, BANDS, TEN, (False,)),
+    "develop": (DEVELOP, tuple(rubbers(DEVELOP)), range(RECORDINGS), PULLS),
+    "sealed": (SEALED, tuple(rubbers(SEALED)), range(RECORDINGS), PULLS),
+    "bands": (DEVELOP, BANDS, FRESH, PULLS[1:]),
 }
 
 
-def jobs(name: str, most: int = TEN) -> list[OneRecording]:
-    """List at most so many recordings of each band of a set by each pull, worn ones once."""
-    seed, bands, count, states = SETS[name]
-    return [
-        OneRecording(seed, band, pull, False, 0, **otherwise)
+def jobs(name: str, most: int = len(FRESH)) -> list[OneRecording]:
+    """List at most so many recordings of each band of a set by each pull."""
+    seed, bands, numbers, pulls = SETS[name]
+    recorded = [
+        OneRecording(seed, band, pull, number)
+        for number in numbers[:most]
+        for pull in pulls
+        for band in bands
+    ]
+    otherwise = [
+        OneRecording(seed, band, pull, 0, **otherwise)
         for pull, otherwise in OTHERWISE
         for band in bands
-    ] + [
-        OneRecording(seed, band, pull, worn, number)
-        for number in range(min(count, most))
-        for worn in states
-        for pull in PULLS
-        for band in bands
-        if not (worn and number)
+        if 0 in numbers
     ]
+    return recorded + otherwise
 
 
 def identified(job: OneRecording, work: Path) -> dict:
     """Scores of a method by one recording, and what it says of itself."""
     params, begin = job.params, time.process_time()
-    folder = work / fingerprint(repr(job))
-    episode = recorded(params, job.band, folder)
+    folder = work / f"{job.seed}-{job.band}-{job.pull}-{job.number}"
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "lock").open("w") as lock:  # one records, others of the same recording wait
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        episode = recorded(params, job.band, folder)
     sling, start = sling_of(params, job.band, job.method, folder), time.process_time()
     outcome, confidence = calibrated_by(params, job.method, sling, [episode])
     with World(job.band, saved(params, folder / "params.yaml"), workers=1) as world:
@@ -124,7 +125,6 @@ def identified(job: OneRecording, work: Path) -> dict:
             outcome, confidence = calibrated_by(params, job.method, sling, [episode], observed)
         seconds = time.process_time() - start
         scores = scored(outcome, params, world, seed=job.number)
-    shutil.rmtree(folder)
     return {
         "scores": scores,
         "confidence": {name: confidence.get(name) for name in STORED},
@@ -279,7 +279,7 @@ def report_of(name: str) -> Path:
 def main() -> None:
     parser = runner.parser(__doc__, None, WORK)
     parser.add_argument("set", choices=SETS)
-    parser.add_argument("--recordings", type=int, default=TEN, help="of each band, at most")
+    parser.add_argument("--recordings", type=int, default=len(FRESH), help="of each band, at most")
     args = parser.parse_args()
     if args.recordings < 1:
         raise UserError("--recordings: from 1 on")

@@ -36,7 +36,7 @@ from validation.campaigns import runner
 from validation.campaigns.runner import POSTERIOR
 from validation.density import calibrated_by
 from validation.projects import DEFAULTS
-from validation.ranks import part_below, summary
+from validation.ranks import LEVEL, part_below, summary
 from validation.reports import write_report
 from validation.synthetic import visible
 
@@ -150,8 +150,8 @@ def ranked(params: Params, method: str, dips: Sequence[Dip], seed: Sequence[int]
 
     Returns:
         "below": the share of the posterior's samples below the truth, by coordinate, and of a
-        launch, whose draw is off as a hand's is; "truth" by coordinate; "settled"; "pictures" of
-        the recoil [s].
+        launch, whose draw is off as a hand's is; "truth" by coordinate; "settled"; "edges";
+        "effective" samples; "pictures" of the recoil [s].
     """
     rng = np.random.default_rng(seed)
     virtual_band = sampled(params, method, dips, rng)
@@ -172,6 +172,8 @@ def ranked(params: Params, method: str, dips: Sequence[Dip], seed: Sequence[int]
         "below": dict(zip(names, below, strict=True)) | {"landing": launch},
         "truth": dict(zip(names, virtual_band.phi, strict=True)),
         "settled": confidence["settled"],
+        "edges": confidence["edges"],
+        "effective": confidence["effective_samples"],
         "pictures": confidence["recordings"][0]["pictures"],
     }
 
@@ -202,15 +204,27 @@ def figures(lines: list[dict]) -> dict:
             name: np.array([line["below"][name] for line in good], float)
             for name in good[0]["below"]
         }
+        said, unsaid = (
+            [line["below"]["landing"] for line in good if line["settled"] == settled]
+            for settled in (True, False)
+        )
         ranks = {name: summary(part[np.isfinite(part)]) for name, part in parts.items()}
         result[pull] = {
             "episodes": len(good),
             "refused": [line["failed"] for line in some if "failed" in line],
             "settled": sum(line["settled"] for line in good),
             "ranks": ranks,
+            "landing": {name: inside(of) for name, of in (("settled", said), ("not", unsaid))},
             "met": all(HELD[0] <= rank["coverage"] <= HELD[1] for rank in ranks.values()),
         }
     return result
+
+
+def inside(parts: Sequence[float | None]) -> list[int]:
+    """How many launches are inside their 90 % intervals, by their shares below, and of how many."""
+    landed = np.asarray(parts, dtype=float)
+    landed = landed[np.isfinite(landed)]
+    return [int(np.sum(np.abs(landed - 0.5) <= LEVEL / 2)), len(landed)]
 
 
 def main() -> None:

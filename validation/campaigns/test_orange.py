@@ -21,8 +21,8 @@ ONE_EACH = {name: [f"{name}.mcap"] for name in (NAME, f"{NAME}_2", f"{NAME}_3")}
 BANDS = ONE_EACH | {"all": [file for files in ONE_EACH.values() for file in files]}
 LAB = "setup:\n  arm_stiffness: null\n"  # its note says where the hand was, not where it was sent
 ERROR = 1e-3  # m, of a draw
-MOST = {"each": 0.02, "all": 0.012}  # of the bias
-LEAST_INSIDE = 0.85
+MOST = {"each": 0.02, "all": 0.04}  # of the bias
+LEAST_INSIDE = {"each": 11, "all": 12}  # of 13
 
 
 def figures_of(band: Path) -> dict:
@@ -56,17 +56,31 @@ def test_recordings_that_this_project_did_not_make(tmp_path, progress, record) -
         run(*SLING, "fit", *(str(RECORDINGS / file) for file in files), "--name", name, *sizes)
         figures[name] = figures_of(tmp_path / "bands" / name)
         progress(f"  {name}: {100 * figures[name]['bias']:+.2f} %, {figures[name]['inside']} in")
-    bias = {name: abs(of["bias"]) for name, of in figures.items()}
+    together = figures["all"]
+    met = {
+        f"{name}, bias": abs(of["bias"]) <= MOST["each"]
+        for name, of in figures.items()
+        if name in ONE_EACH
+    }
+    met |= {
+        "all, bias": abs(together["bias"]) <= MOST["all"],
+        "all, inside": together["inside"] >= LEAST_INSIDE["all"],
+        "all, narrower than each": all(
+            together["mean_width"] < figures[name]["mean_width"] for name in ONE_EACH
+        ),
+    }
     record(
         "orange",
         requested="Landings of a band of another engine and renderer, identified by `sling fit`:"
         f" |bias| at most {100 * MOST['each']:g} % by each of its three recordings,"
-        f" {100 * MOST['all']:g} % by all together. No landing was evidence; the choice of"
-        " `turn_damping` as a coordinate came from these recordings' pictures.",
-        met=max(bias[name] for name in ONE_EACH) <= MOST["each"] and bias["all"] <= MOST["all"],
+        f" {100 * MOST['all']:g} % by all together, whose intervals hold at least"
+        f" {LEAST_INSIDE['all']} landings and are narrower than those of each. No landing was"
+        " evidence; the choice of `turn_damping` as a coordinate came from these recordings'"
+        " pictures.",
+        met=all(met.values()),
         settings={"band": ABOUT, "lab": LAB},
-        figures=figures,
+        figures=figures | {"met": met},
     )
-    assert all(of["failed"] == 0 for of in figures.values())
-    for name in ONE_EACH:
-        assert figures[name]["inside"] >= LEAST_INSIDE * figures[name]["launches"]
+    assert all(figures[name]["failed"] == 0 for name in BANDS)
+    assert all(figures[name]["inside"] >= LEAST_INSIDE["each"] for name in ONE_EACH)
+    assert met["all, bias"] and met["all, inside"]

@@ -24,7 +24,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> ProjectCopy:
     recording = re.search(r"^DEMO = (.*)$", makefile, re.M)
     assert recording
     copy("python", "-m", "stages.record", Path(recording[1]).stem)
-    copy("sling", "fit", recording[1], "--mass", "0.023", "--name", "mine")
+    copy("sling", "fit", recording[1], "--mass", "0.023", "--diameter", "0.0072", "--name", "mine")
     return copy
 
 

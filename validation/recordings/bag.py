@@ -21,7 +21,7 @@ from mcap.records import Channel, Schema
 from mcap.records import Message as Recorded
 from mcap.writer import Writer
 from mcap_ros2._dynamic import serialize_dynamic
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
 from sling2sim2real.base.minimum_jerk import minimum_jerk
@@ -136,10 +136,6 @@ class RosWriter:
         self._writer.start("ros2")
         self._channels: dict[str, tuple[int, Callable[[object], bytes]]] = {}
         self.finish = self._writer.finish
-
-    def register(self, name: str, fields: str) -> None:
-        """Add a type by the text of its .msg file."""
-        self._types.register(get_types_from_msg(fields, name))
 
     def write(self, topic: str, name: str, time: int, message: object) -> None:
         """Write a message of a type, received and sent at a time [ns]."""

@@ -7,16 +7,18 @@ the lab's own.
 from __future__ import annotations
 
 import base64
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import foxglove
 import numpy as np
 from foxglove import messages as fox
-from google.protobuf.descriptor_pb2 import FieldDescriptorProto as Field
 from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.json_format import ParseDict
 from google.protobuf.message_factory import GetMessageClass
+from google.protobuf.timestamp_pb2 import DESCRIPTOR as TIMESTAMP
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
@@ -44,8 +46,7 @@ def translate(
     """
     context = foxglove.Context()
     writer_options = foxglove.mcap.MCAPWriteOptions(**options)
-    make = _Protobuf if encoding == "protobuf" else _Json
-    channels: dict[str, object] = {}
+    channels = {}
     with (
         source.open("rb") as file,
         foxglove.open_mcap(
@@ -57,16 +58,17 @@ def translate(
             kind = schema.name.rsplit("/", 1)[-1]
             topic = channel.topic.replace("tf_static", "tf")
             if topic not in channels:
-                channels[topic] = make(topic, kind, raw, context)
-            channels[topic].log(fields(kind, message, raw), record.log_time)
+                name = "foxglove.RawImage" if raw and kind == "CompressedImage" else SCHEMAS[kind]
+                channels[topic] = _channel(topic, name, encoding, context)
+            out, pack = channels[topic]
+            out.log(pack(fields(kind, message, raw)), log_time=record.log_time)
 
 
 def fields(kind: str, message: object, raw: bool) -> dict[str, object]:
-    """A ROS message as the fields of Foxglove's schema, in plain Python."""
+    """A ROS message as Foxglove's schema has it in JSON, from which protobuf makes its own."""
     if kind == "TFMessage":
         return {"transforms": [_transform(transform) for transform in message.transforms]}
-    stamp = {"sec": message.header.stamp.sec, "nsec": message.header.stamp.nanosec}
-    head = {"timestamp": stamp, "frame_id": message.header.frame_id}
+    head = {"timestamp": _time(message), "frame_id": message.header.frame_id}
     if kind == "WrenchStamped":
         return {**head, "wrench": {"force": _axes(message.wrench.force, "xyz")}}
     if kind == "PoseStamped":
@@ -75,7 +77,8 @@ def fields(kind: str, message: object, raw: bool) -> dict[str, object]:
         return {**head, "pose": {"position": position, "orientation": orientation}}
     if kind == "JointState":
         joints = zip(message.name, message.position, strict=True)
-        return {"timestamp": stamp, "joints": [{"name": n, "position": p} for n, p in joints]}
+        joints = [{"name": name, "position": place} for name, place in joints]
+        return {"timestamp": head["timestamp"], "joints": joints}
     if kind == "CameraInfo":
         size = {"width": message.width, "height": message.height}
         numbers = {name.upper(): list(getattr(message, name)) for name in "dkrp"}
@@ -83,18 +86,22 @@ def fields(kind: str, message: object, raw: bool) -> dict[str, object]:
     depth = "compressedDepth" in message.format
     data = bytes(message.data)[12 if depth else 0 :]
     if not raw:
-        return {**head, "format": "png" if depth else "jpeg", "data": data}
+        return {**head, "format": "png" if depth else "jpeg", "data": _text(data)}
     pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     pixels = (pixels / 1000).astype(np.float32) if depth else pixels[..., ::-1]
     height, width = pixels.shape[:2]
-    return {
-        **head,
-        "height": height,
-        "width": width,
-        "encoding": "32FC1" if depth else "rgb8",
-        "step": width * (4 if depth else 3),
-        "data": pixels.tobytes(),
-    }
+    encoding, step = ("32FC1", 4 * width) if depth else ("rgb8", 3 * width)
+    size = {"height": height, "width": width, "encoding": encoding, "step": step}
+    return {**head, **size, "data": _text(pixels.tobytes())}
+
+
+def _time(message: object) -> str:
+    stamp = message.header.stamp
+    return f"{np.datetime64(stamp.sec * 10**9 + stamp.nanosec, 'ns')}Z"
+
+
+def _text(data: bytes) -> str:
+    return base64.b64encode(data).decode()
 
 
 def _axes(vector: object, names: str) -> dict[str, float]:
@@ -103,7 +110,7 @@ def _axes(vector: object, names: str) -> dict[str, float]:
 
 def _transform(transform: object) -> dict[str, object]:
     return {
-        "timestamp": {"sec": transform.header.stamp.sec, "nsec": transform.header.stamp.nanosec},
+        "timestamp": _time(transform),
         "parent_frame_id": transform.header.frame_id,
         "child_frame_id": transform.child_frame_id,
         "translation": _axes(transform.transform.translation, "xyz"),
@@ -111,72 +118,48 @@ def _transform(transform: object) -> dict[str, object]:
     }
 
 
-def _schema(kind: str, raw: bool) -> str:
-    return "foxglove.RawImage" if raw and kind == "CompressedImage" else SCHEMAS[kind]
+def _channel(
+    topic: str, name: str, encoding: str, context: foxglove.Context
+) -> tuple[foxglove.Channel, Callable[[dict[str, object]], dict[str, object] | bytes]]:
+    """Of the schemas of Foxglove's SDK, and of the lab's own; how its messages are packed."""
+    if encoding == "json":
+        schema = {"title": name, "type": "object", "properties": {}}
+        return foxglove.Channel(topic, schema=schema, context=context), dict
+    if name.startswith("lab."):
+        times = FileDescriptorProto.FromString(TIMESTAMP.serialized_pb)
+        files = FileDescriptorSet(file=[times, _lab_file()]).SerializeToString()
+        schema = foxglove.Schema(name=name, encoding=encoding, data=files)
+    else:
+        schema = getattr(fox, name.removeprefix("foxglove.")).get_schema()
+    pool = DescriptorPool()
+    for file in FileDescriptorSet.FromString(schema.data).file:
+        pool.Add(file)
+    message = GetMessageClass(pool.FindMessageTypeByName(name))
+    channel = foxglove.Channel(topic, schema=schema, message_encoding=encoding, context=context)
+    return channel, lambda content: ParseDict(content, message()).SerializeToString()
 
 
-class _Json:
-    def __init__(self, topic: str, kind: str, raw: bool, context: foxglove.Context) -> None:
-        schema = {"title": _schema(kind, raw), "type": "object", "properties": {}}
-        self.channel = foxglove.Channel(topic, schema=schema, context=context)
-
-    def log(self, content: dict[str, object], time: int) -> None:
-        if "data" in content:
-            content = {**content, "data": base64.b64encode(content["data"]).decode()}
-        self.channel.log(content, log_time=time)
-
-
-class _Protobuf:
-    """Schemas of Foxglove's SDK, and the lab's own, written by protobuf's runtime."""
-
-    def __init__(self, topic: str, kind: str, raw: bool, context: foxglove.Context) -> None:
-        name = _schema(kind, raw)
-        if kind == "WrenchStamped":
-            files = FileDescriptorSet(file=[_wrench_file()]).SerializeToString()
-            schema = foxglove.Schema(name=name, encoding="protobuf", data=files)
-        else:
-            schema = getattr(fox, name.removeprefix("foxglove.")).get_schema()
-        pool = DescriptorPool()
-        for file in FileDescriptorSet.FromString(schema.data).file:
-            pool.Add(file)
-        self.message = GetMessageClass(pool.FindMessageTypeByName(name))
-        self.channel = foxglove.Channel(
-            topic, schema=schema, message_encoding="protobuf", context=context
-        )
-
-    def log(self, content: dict[str, object], time: int) -> None:
-        self.channel.log(self.message(**_timed(content)).SerializeToString(), log_time=time)
+LAB = {  # messages of a lab's own, and the fields of each
+    "Vector3": {axis: {"type": "TYPE_DOUBLE"} for axis in "xyz"},
+    "Wrench": {name: {"type_name": ".lab.Vector3"} for name in ("force", "torque")},
+    "WrenchStamped": {
+        "timestamp": {"type_name": ".google.protobuf.Timestamp"},
+        "frame_id": {"type": "TYPE_STRING"},
+        "wrench": {"type_name": ".lab.Wrench"},
+    },
+}
 
 
-def _timed(content: dict[str, object]) -> dict[str, object]:
-    """Stamps as protobuf's have their fields, also of what lies in a list."""
-    timed = {
-        name: [_timed(part) for part in value] if name in ("transforms", "joints") else value
-        for name, value in content.items()
-    }
-    if "timestamp" in content:
-        stamp = content["timestamp"]
-        timed["timestamp"] = {"seconds": stamp["sec"], "nanos": stamp["nsec"]}
-    return timed
-
-
-def _wrench_file() -> FileDescriptorProto:
-    file = FileDescriptorProto(name="lab.proto", package="lab", syntax="proto3")
-
-    def message(name: str, **kinds: object) -> None:
-        descriptor = file.message_type.add(name=name)
-        for number, (field, kind) in enumerate(kinds.items(), 1):
-            nested = isinstance(kind, str)
-            descriptor.field.add(
-                name=field,
-                number=number,
-                label=Field.LABEL_OPTIONAL,
-                type=Field.TYPE_MESSAGE if nested else kind,
-                type_name=f".lab.{kind}" if nested else None,
-            )
-
-    message("Time", seconds=Field.TYPE_INT64, nanos=Field.TYPE_INT32)
-    message("Vector3", **dict.fromkeys("xyz", Field.TYPE_DOUBLE))
-    message("Wrench", force="Vector3", torque="Vector3")
-    message("WrenchStamped", timestamp="Time", frame_id=Field.TYPE_STRING, wrench="Wrench")
-    return file
+def _lab_file() -> FileDescriptorProto:
+    kinds = [
+        {
+            "name": name,
+            "field": [
+                {"name": field, "number": number, "type": "TYPE_MESSAGE", **kind}
+                for number, (field, kind) in enumerate(fields.items(), 1)
+            ],
+        }
+        for name, fields in LAB.items()
+    ]
+    file = {"name": "lab.proto", "package": "lab", "syntax": "proto3", "message_type": kinds}
+    return ParseDict({**file, "dependency": [TIMESTAMP.name]}, FileDescriptorProto())

@@ -7,7 +7,7 @@ here did not learn from it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -258,24 +258,6 @@ def _millimetres(depth: np.ndarray, random) -> Picture:
     return Picture("16UC1", "", data, *depth.shape, 2 * depth.shape[1])
 
 
-@dataclass
-class LookSignals:
-    """What the pipeline knows of the hand; the same names as sling2sim2real.recording.signals."""
-
-    time: np.ndarray
-    origin: int = 0
-    grasp_time: float = TRUTH.grasp
-    release_time: float = TRUTH.release
-    tool_axis: np.ndarray = field(default_factory=lambda: APPROACH)
-    facts: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(turn=0.0))
-
-    def hand(self, time: float) -> np.ndarray:
-        return TRUTH.hand(time)
-
-    def opening_at(self, time: float) -> float:
-        return opening(time)
-
-
 def times(count: int) -> np.ndarray:
     """Stamps of so many frames with a pace that is finer after the release."""
     before = np.linspace(0.05, TRUTH.release - 0.03, count - 2 * count // 5)
@@ -319,7 +301,16 @@ def assemble(look: Appearance, stamps: np.ndarray, colors: list, depths: list) -
     geometry = Geometry(
         Transform.identity(), Transform(turn, place), to_color, Rotation.identity(), True, {}
     )
-    signals = LookSignals(np.linspace(0, TRUTH.end, 140))
+    signals = SimpleNamespace(  # what the pipeline knows of the hand: recording.signals.Signals
+        time=np.linspace(0, TRUTH.end, 140),
+        origin=0,
+        grasp_time=TRUTH.grasp,
+        release_time=TRUTH.release,
+        tool_axis=APPROACH,
+        facts=SimpleNamespace(turn=0.0),
+        hand=TRUTH.hand,
+        opening_at=opening,
+    )
     scene = Scene(TIPS, FLOOR, look.diameter, REST, signals)
     return View(recording, geometry, scene, TRUTH.end)
 
@@ -364,21 +355,18 @@ def score(
 
 def figures(view: View, truths: list[FrameTruth], clouds: object) -> dict[str, dict[str, float]]:
     """Score all frames and each phase: median distance from the surface, covered share, strays."""
-    phase_scores: dict[str, list] = {"all": []}
-    numbered = zip(view.frames(), clouds.points, strict=True)
-    for (number, frame), points in numbered:
-        frame_score = score(view, frame, truths[number], points)
-        phase_scores["all"].append(frame_score)
-        phase_scores.setdefault(phase(frame.time), []).append(frame_score)
+    scores: dict[str, list] = {"all": []}
+    for (number, frame), points in zip(view.frames(), clouds.points, strict=True):
+        one = score(view, frame, truths[number], points)
+        scores["all"].append(one)
+        scores.setdefault(phase(frame.time), []).append(one)
     summary = {}
-    for name, scores in phase_scores.items():
-        off = np.concatenate([frame_score["off"] for frame_score in scores])
+    for name, some in scores.items():
+        off, covered = (np.concatenate([one[key] for one in some]) for key in ("off", "covered"))
         summary[name] = {
-            "frames": len(scores),
+            "frames": len(some),
             "median_off_m": float(np.median(off)),
-            "covered": float(
-                np.mean(np.concatenate([frame_score["covered"] for frame_score in scores]))
-            ),
+            "covered": float(np.mean(covered)),
             "further_than_1cm": float(np.mean(off > 0.01)),
         }
     return summary

@@ -5,7 +5,6 @@ Names end with their unit; times are seconds since the file's first force, vecto
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -77,7 +76,7 @@ def of_pull(done: Processed) -> Facts:
         told["keeps_prior"] = unseen(phases)
     if whole:
         told["cloud"] = of_clouds(whole)
-        told["phases"] = [asdict(phase) for phase in by_phase(whole.coverage)]
+        told["phases"] = by_phase(whole.coverage)
         if whole.calibration:
             told["extrinsics"] = of_extrinsics(whole.calibration, part.geometry)
     return told

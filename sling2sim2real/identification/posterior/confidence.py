@@ -13,6 +13,7 @@ from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator
 from sling2sim2real.identification.posterior.coordinates import DAMPING, PRODUCT
 from sling2sim2real.identification.posterior.identify import Identified, recorded_history
+from sling2sim2real.identification.posterior.launches import MEASURED
 from sling2sim2real.identification.posterior.likelihood import SIMULATED
 from sling2sim2real.identification.posterior.sampling import without_each
 from sling2sim2real.identification.results.evaluations import Evaluations
@@ -165,19 +166,29 @@ def misfit_without(density: Identified, number: int) -> float:
 
 
 def _launches(density: Identified) -> list[dict]:
-    """What the density leaves of each launch, and its score by all other evidence."""
+    """What the density leaves of each launch's measurements, and scores by all other evidence."""
     launches, expansion = density.launches, density.fit.launches
     if launches is None or expansion is None:
         return []
     scores = without_each(density.density, density.coordinates, density.birge)
-    return [
-        {
-            "draw": draw.tolist(),
-            "landing": float(landing),
-            "left": None if np.isnan(gap) else float(gap),
-            "z_without_it": None if np.isnan(score) else float(score),
+    entries = []
+    for number, draw in enumerate(launches.draws):
+        measured = launches.measured[number]
+        names = [name for name, value in zip(MEASURED, measured, strict=True) if value == value]
+        mine = expansion.launch == number
+        columns = {
+            "measured": measured[~np.isnan(measured)],
+            "left": expansion.off[mine],
+            "z_without_it": scores[mine],
         }
-        for draw, landing, gap, score in zip(
-            launches.draws, launches.landings, expansion.log_ratio, scores, strict=True
+        entries.append(
+            {"draw": draw.tolist()}
+            | {what: _named(names, values) for what, values in columns.items()}
         )
-    ]
+    return entries
+
+
+def _named(names: list[str], values: np.ndarray) -> dict[str, float | None]:
+    """Values by names; JSON has no NaN."""
+    finite = [None if np.isnan(value) else float(value) for value in values]
+    return dict(zip(names, finite, strict=True))

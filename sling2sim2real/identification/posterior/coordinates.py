@@ -111,6 +111,13 @@ class Coordinates:
         values[:, gaussian] = truncnorm.ppf(parts[:, gaussian], low, high, mean, spread)
         return self.rectified(values)
 
+    @property
+    def spikes(self) -> np.ndarray:
+        """What a rectified prior has at its end, over its density there, shape (D,); else 0."""
+        spikes, rectified = np.zeros(len(self.names)), self.lowest < self.low
+        spikes[rectified] = np.sqrt(np.pi / 2 / self.precision[rectified])
+        return spikes
+
     def rectified(self, phi: np.ndarray) -> np.ndarray:
         """Coordinates (N, D) of which none is below its parameter's end."""
         return np.maximum(phi, self.low)

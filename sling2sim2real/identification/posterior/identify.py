@@ -124,6 +124,8 @@ def fit_posterior(
         recordings = [recording.aligned(nearest) for recording in recordings]
     except Failed:
         pass  # the fit says why
+    alike = sum(recording.shows_recoil for recording in recordings)
+    recordings = [recording.among(max(alike, 1)) for recording in recordings]
     fitted = fit(recordings, coordinates, begin, **options)
     follows = [
         recording.with_wider_tolerances(it)

@@ -102,6 +102,8 @@ class Likelihood:
         episode, cutoff: As given.
         sling: As given, with the pads' opening time of this episode.
         tolerances: By the episode's metadata, until `with_wider_tolerances`.
+        alike: How many recordings show a recoil. What the law gets wrong of it is in all of them,
+            so that together they may not tell more of it than one: each counts as one of so many.
         camera_shift: What was added to the camera's stamps before the fit [s].
     """
 
@@ -111,7 +113,7 @@ class Likelihood:
         """`friction` is what the method fixes, of the pads."""
         self.episode, self.cutoff = episode, cutoff
         self.sling = with_recorded_pads(sling, episode, friction)
-        self.tolerances, self.camera_shift = Tolerances.of(episode), 0.0
+        self.tolerances, self.camera_shift, self.alike = Tolerances.of(episode), 0.0, 1
         end = np.searchsorted(episode.time, episode.release_time)
         place = episode.position[max(end - 5, 0) : end].mean(axis=0)
         self._along_pull = place / np.linalg.norm(place)
@@ -132,6 +134,18 @@ class Likelihood:
         aligned.episode = replace(self.episode, cloud_time=self.episode.cloud_time + best)
         aligned._picture_count = _picture_count(aligned.episode)
         return aligned
+
+    @property
+    def shows_recoil(self) -> bool:
+        """Whether any picture of the recoil counts."""
+        pictures = Rule().pictures(self.episode)
+        return bool((self.episode.cloud_time[pictures] > self.episode.release_time).any())
+
+    def among(self, alike: int) -> Likelihood:
+        """Copy that is one of so many that show a recoil."""
+        one = copy(self)
+        one.alike = alike
+        return one
 
     def with_wider_tolerances(self, expansion: Expansion) -> Likelihood:
         """Copy with force and recoil as sure as the law can follow them.
@@ -268,5 +282,5 @@ class Likelihood:
         columns = [sizes[re.sub("_[xyz]$", "", name)] * change for name, change in changes.items()]
         for picture in np.unique(residuals.picture[residuals.recoils]):
             columns.append(has.jitter * np.where(residuals.of_picture(picture), camera, 0.0))
-        weight = 1 / residuals.spread(has.force, has.cloud, has.recoil)
+        weight = 1 / residuals.spread(has.force, has.cloud, np.sqrt(self.alike) * has.recoil)
         return Form.of(residuals, weight, np.array(columns))

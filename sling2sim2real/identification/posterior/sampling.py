@@ -35,6 +35,7 @@ SURFACE_RIDGE = 1e-2  # of the terms of second order
 CHAIN_STEPS = 300  # of the chains, which start at the last batch: some six autocorrelation times
 GIBBS_SWEEPS = 250  # of chains that begin at the centre
 LEFT_SAMPLES = 2000  # by which a launch is judged that is left out
+LEFT_SMOOTHING, LEFT_PLACES = 0.2, 801  # of its predictions, in their deviations; and on a grid
 LEAST_LEFT = 1e-6  # of a coordinate's precision
 TAIL_END = 8.0  # standard deviations, where a tail has no numbers left
 
@@ -104,6 +105,7 @@ def truncated_gaussian(
     high: np.ndarray,
     count: int,
     rng: np.random.Generator,
+    spikes: np.ndarray | None = None,
 ) -> np.ndarray:
     """Samples (count, D) of the density exp(-(x - centre)' precision (x - centre) / 2) in a box.
 
@@ -112,6 +114,7 @@ def truncated_gaussian(
     Args:
         centre: Maximum of the unbounded Gaussian (D,), which may lie outside the box.
         precision: Positive definite, (D, D).
+        spikes: `Coordinates.spikes`, where the box's low ends have such.
     """
     spread = 1 / np.sqrt(np.diag(precision))
     chains = np.tile(np.clip(centre, low, high), (count, 1))
@@ -128,35 +131,60 @@ def truncated_gaussian(
             part = below + rng.random(count) * (above - below)
             tail = np.where(above > below, ndtri(np.clip(part, 1e-16, 1 - 1e-16)), ends[0])
             chains[:, axis] = np.clip(mean + deviation * tail, low[axis], high[axis])
+            if spikes is not None and spikes[axis]:
+                inside = deviation * np.sqrt(2 * np.pi) * (ndtr(-ends[0]) - ndtr(-ends[1]))
+                at_end = spikes[axis] * np.exp(-0.5 * ends[0] ** 2)
+                chains[rng.random(count) * (at_end + inside) < at_end, axis] = low[axis]
     return chains
 
 
 def without_each(density: Fit, coordinates: Coordinates, widening: float = 1.0) -> np.ndarray:
-    """How unlikely each launch is by all other evidence, as a standard score (leave-one-out).
+    """How unlikely each measurement of a launch is by all evidence but that launch (leave-one-out).
 
-    By the density's quadratic at its mode, within bounds: without launch i the precision is
-    H - d d' and the gradient g - d gap, d its column of `design`.
+    A standard score each, by the smallest interval of predictions that holds it. By the density's
+    quadratic at its mode, within bounds: without a launch the precision is H - d d' and the
+    gradient g - d gap, d its columns of `design`.
 
     Args:
         density: As `widened` gives it.
         widening: By what the evidence's standard deviations are multiplied in it.
 
     Returns:
-        Shape (N,); positive where it landed further than predicted, NaN for a launch that fails.
+        Shape (M,); positive where it flew further than predicted, NaN for a launch that fails.
     """
     launches, box = density.launches, (coordinates.low, coordinates.high)
     assert launches is not None
-    scores, ridge = np.full(len(launches.gap), np.nan), np.diag(np.diag(density.hessian))
-    for i in np.flatnonzero(~launches.failed):
-        gap, slope = launches.gap[i], launches.design[:, i]
+    scores, ridge = np.full(len(launches.off), np.nan), np.diag(np.diag(density.hessian))
+    for i in np.unique(launches.launch[~launches.failed]):
+        mine = np.flatnonzero(launches.launch == i)
+        gap, design = launches.gap[mine], launches.design[:, mine]
         # Of a coordinate that this launch alone tells nothing else would be left.
-        rest = density.hessian - np.outer(slope, slope) / widening**2 + LEAST_LEFT * ridge
-        step = np.linalg.solve(rest, density.gradient - slope * gap / widening**2)
+        rest = density.hessian - design @ design.T / widening**2 + LEAST_LEFT * ridge
+        step = np.linalg.solve(rest, density.gradient - design @ gap / widening**2)
         rng = np.random.default_rng(i)
-        phi = truncated_gaussian(density.phi + step, rest, *box, LEFT_SAMPLES, rng)
-        longer = ndtr((phi - density.phi) @ slope - gap).mean()  # chance of a longer landing
-        scores[i] = -ndtri(np.clip(longer, 1e-12, 1 - 1e-12))
+        phi = truncated_gaussian(
+            density.phi + step, rest, *box, LEFT_SAMPLES, rng, coordinates.spikes
+        )
+        off = (phi - density.phi) @ launches.slopes[:, mine] - launches.off[mine]
+        scores[mine] = [
+            _score(*of) for of in zip(off.T, widening * launches.spread[mine], strict=True)
+        ]
     return scores
+
+
+def _score(centres: np.ndarray, spread: float) -> float:
+    """Standard score of 0 among predictions: Gaussians of a spread around centres (N,).
+
+    As likely as what is less dense (Hyndman, 1996, 10.1080/00031305.1996.10474359): a central
+    interval would leave out the densest where they end at a bound.
+    """
+    spread = np.hypot(spread, LEFT_SMOOTHING * centres.std())
+    low, high = min(centres.min(), 0.0) - 6 * spread, max(centres.max(), 0.0) + 6 * spread
+    places = np.append(np.linspace(low, high, LEFT_PLACES), 0.0)
+    dense = np.exp(-0.5 * ((places[:, None] - centres) / spread) ** 2).mean(axis=1)
+    dense, here = dense[:-1], dense[-1]
+    less = dense[dense <= here].sum() / dense.sum()
+    return float(np.sign(-np.median(centres)) * -ndtri(np.clip(less / 2, 1e-12, 0.5)))
 
 
 @dataclass(frozen=True)

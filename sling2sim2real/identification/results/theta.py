@@ -106,8 +106,9 @@ class RecordingResiduals(JsonRecord):
 
 class LaunchResidual(JsonRecord):
     draw: Annotated[tuple[float, float], LIST]
-    landing: float
-    left: float | None
+    measured: dict[Name, float]
+    left: dict[Name, float | None]
+    z_without_it: dict[Name, float | None]
 
 
 class CorrelationMatrix(JsonRecord):

@@ -44,9 +44,10 @@ class Case:
             [np.full(3 * FORCES, force), np.full(2 * BINS, np.hypot(cloud, recoil))]
         )
 
-    def expanded(self):
+    def expanded(self, alike: int = 1):
         recording = object.__new__(Likelihood)
         recording.tolerances, recording.camera_shift = self.tolerances, 0.0
+        recording.alike = alike
         camera = self.nuisance_slopes[1]
         form = recording._form(self.residuals, self.gap, camera)
         parts = self.gap, self.slopes, self.nuisance_slopes, 0 * self.gap
@@ -153,6 +154,24 @@ def test_each_tolerance_widens_what_is_known(case, name):
     eigenvalues = np.linalg.eigvalsh(case.expanded().hessian - wide.hessian)
     size = np.abs(case.expanded().hessian).max()
     assert eigenvalues.max() > 1e-9 * size and eigenvalues.min() > -1e-9 * size
+
+
+def test_recordings_repeat_what_the_law_gets_wrong_of_the_recoil_and_no_instrument(case):
+    """Three alike: where the recoil's law alone errs they tell as much as one, else more."""
+
+    def together(case: Case) -> np.ndarray:
+        return 3 * case.expanded(alike=3).hessian
+
+    exact = dict.fromkeys(("release", "camera", "hand", "jitter", "shift", "turn", "drift"), 1e-12)
+    exact |= dict.fromkeys(("bias", "gain", "pose"), 1e-12)
+    by_law = Case(**exact, force=1e9, cloud=1e-12)
+    np.testing.assert_allclose(together(by_law), by_law.expanded().hessian, rtol=1e-6)
+    by_instruments = Case(recoil=1e-12)
+    np.testing.assert_allclose(
+        together(by_instruments), 3 * by_instruments.expanded().hessian, rtol=1e-6
+    )
+    least = np.linalg.eigvalsh(together(case) - case.expanded().hessian).min()
+    assert least > -1e-9 * np.abs(together(case)).max()
 
 
 def test_tolerances_are_the_episodes_own_or_as_usual():

@@ -91,10 +91,11 @@ class Launches:
         self.of, self.fails, self.told = of, fails, []
 
     def expand(self, points, phi, steps) -> LaunchExpansion:
-        left, design = self.of.seen - curve(phi), slopes(phi) / self.of.sigma
+        left, change, count = self.of.seen - curve(phi), slopes(phi), np.arange(40)
         if self.fails(phi):
-            left, design = np.full_like(left, np.nan), 0 * design
-        self.told.append(LaunchExpansion(left, np.full(40, self.of.sigma), design))
+            left, change = np.full_like(left, np.nan), 0 * change
+        spread, white = np.full(40, self.of.sigma), np.eye(40) / self.of.sigma
+        self.told.append(LaunchExpansion(left, change, spread, white, count))
         return self.told[-1]
 
 
@@ -126,7 +127,7 @@ def test_the_fit_keeps_the_launches_of_its_mode():
     first, second = curves(2)
     launches = Launches(second)
     result = fit([first], space(), START, launches=launches)
-    np.testing.assert_array_equal(result.launches.log_ratio, second.seen - curve(result.phi))
+    np.testing.assert_array_equal(result.launches.off, second.seen - curve(result.phi))
 
 
 def test_a_step_into_failure_is_taken_shorter():

@@ -13,7 +13,6 @@ import torch
 from pipeline.params import load
 from sling2sim2real.base.files import write_json
 from sling2sim2real.launching.surface.stored import Stored
-from sling2sim2real.policy.check import PolicyCheck, figures
 from sling2sim2real.policy.export import USED, card, write_onnx
 from sling2sim2real.simulator.parameters import THETA
 from tests.golden import expect_golden
@@ -89,7 +88,7 @@ def test_the_example_asks_a_policy_where_this_project_is_not(trained, stored, tm
     for file in files:
         (tmp_path / file.name).write_bytes(file.read_bytes())
     content = written(trained, {**FIGURES, "converged": False})
-    content["launch"] = {"pull_time_s": 4.0, "pause_s": 2.0, "second_more_m": 0.0}
+    content["launch"] = {"pull_time_s": 4.0, "pause_s": 2.0}
     (tmp_path / "card.json").write_text(json.dumps(content))
     code = """
 import runpy, sys
@@ -106,23 +105,6 @@ runpy.run_path("policy_elsewhere.py", run_name="__main__")
     assert "the arm may hold 30 N" in message and "draw in 4.0 s, wait 2.0 s" in message
 
 
-@pytest.mark.slow
-def test_equal_networks_give_equal_bytes(trained, folder, tmp_path) -> None:
-    """In other processes, whose sets are in another order."""
-    torch.save(trained.policy, tmp_path / "network.pickle")
-    code = """
-import torch
-from pathlib import Path
-from sling2sim2real.policy.export import write_onnx
-write_onnx(torch.load("../network.pickle", weights_only=False), Path("policy.onnx"))
-"""
-    for seed in "12":
-        (tmp_path / seed).mkdir()
-        apart(code, tmp_path / seed, PYTHONHASHSEED=seed, PYTHONPATH=str(ROOT))
-        other = (tmp_path / seed / "policy.onnx").read_bytes()
-        assert other == (folder / "policy.onnx").read_bytes()
-
-
 FIGURES = {
     "converged": True,
     "criterion": "mean |y_p - g| <= 0.01 m over 256 targets, no failure",
@@ -134,17 +116,13 @@ FIGURES = {
     "map_mean_error_m": 0.004,
     "failed_launches": {"holding force above the limit": 12},
 }
-NEAR = {"draws": 60, "mean_error_m": 0.001, "max_error_m": 0.004}
-MAP = {"box": {"draws": 0, "mean_error_m": None, "max_error_m": None}, "target_range": NEAR}
 
 
 def written(trained, training: dict, **theta) -> dict:
     """A card of band1 as a reader of the file finds it."""
     params = load(DEFAULTS)
     content = {"theta": dict.fromkeys(THETA, 0.4), **theta}
-    made = card(
-        trained.policy, params, "band1", "ours", content, training=training, landing_map=MAP
-    )
+    made = card(trained.policy, params, "band1", "ours", content, training=training)
     return json.loads(json.dumps(made, allow_nan=False))
 
 
@@ -153,10 +131,5 @@ def test_the_card_is_the_committed_one(seeing) -> None:
     content = written(seeing, FIGURES, nuisances={"air_drag": 2.5})
     versions, settings = content.pop("versions"), content.pop("made_with")
     assert versions["torch"] == torch.__version__.partition("+")[0] and len(versions) == len(USED)
-    assert settings["setup.fork_width"] == 0.275
+    assert settings["setup"]["fork_width"] == 0.275
     expect_golden(json.dumps(content, indent=2) + "\n", Path(__file__).parent / "golden/card.json")
-
-
-def test_what_is_checked_is_what_the_card_says(trained) -> None:
-    checked = PolicyCheck(0.004, 0.011, {})
-    assert figures(trained, checked).keys() == FIGURES.keys()

@@ -249,25 +249,18 @@ def table(contents: dict[str, dict]) -> list[str]:
 
 def sentence(content: dict) -> list[str]:
     """What README says of them, of the report of the sealed rubbers."""
-    means, bands = (content["figures"]["informative, virgin"][key] for key in ("together", "bands"))
+    kind = content["figures"]["informative, virgin"]
+    means, count = kind["together"], kind["settled"][1]
     size, worst, inside, width = (
-        100 * means[key] for key in ("mean_size_of_bias", "worst_bias", "coverage", "median_width")
+        100 * means[key]
+        for key in ("mean_size_of_bias", "worst_bias", "coverage", "median_width")
     )
-    ours, theirs = (
-        100 * content["figures"][kind]["together"]["mean_size_of_bias"]
-        for kind in (f"paper, virgin, {FIRST}", "paper, virgin, the paper's method")
-    )
-    biases = [
-        {name: abs(band["bias"][0]) for name, band in content["figures"][kind]["bands"].items()}
-        for kind in (f"paper, virgin, {FIRST}", "paper, virgin, the paper's method")
-    ]
-    nearer = sum(biases[0][name] < biases[1].get(name, np.nan) for name in biases[0])
+    least = 100 * means["least_coverage"]
     text = (
-        f"On {len(bands)} held-out virtual rubbers, with dips, predictions are off by {size:.1f} %"
-        f" of the distance (mean over recordings; {abs(worst):.1f} % at worst), and {inside:.0f} %"
-        f" of the launches land in 90 % intervals, which are {width:.0f} % wide. By the paper's"
-        f" pull they are off by {ours:.1f} %, the paper's method with the neo-Hookean law by"
-        f" {theirs:.1f} %; `posterior` is nearer on {nearer} of {len(biases[0])}."
+        f"On {len(kind['bands'])} held-out virtual rubbers, with dips ({count} recordings),"
+        f" predictions are off by {size:.1f} % of the distance (mean over recordings;"
+        f" {abs(worst):.1f} % at worst), and {inside:.0f} % of the launches land in 90 % intervals,"
+        f" which are {width:.0f} % wide; of the least covered rubber {least:.0f} % do."
     )
     return paragraph(text)
 

@@ -32,14 +32,15 @@ def main(folder: str, target: str) -> None:
     low, high = wanted["trained_range"]
     if not low <= float(target) <= high:
         print(f"warning: trained for targets from {low:g} to {high:g} {wanted['unit']}")
-    training, setup = card["training"], card["setup"]
+    training, used = card["training"], card["made_with"]
+    band, setup = used["bands"][card["band"]], used["setup"]
     if not training["converged"]:
         print(f"warning: did not converge ({training['criterion']})")
     print(f"the arm may hold {card['max_force_n']:g} N")
     print(
-        f"band: {1e3 * setup['band_mass_kg']:g} g, {1e3 * setup['band_diameter_m']:g} mm,"
-        f" {setup['band_rest_length_m']:g} m; fork: {setup['fork_width_m']:g} m wide, tips"
-        f" {setup['fork_height_m']:g} m high; projectile: {1e3 * setup['projectile_mass_kg']:g} g"
+        f"band: {1e3 * band['mass']:g} g, {1e3 * band['diameter']:g} mm,"
+        f" {band['rest_length']:g} m; fork: {setup['fork_width']:g} m wide, tips"
+        f" {setup['fork_height']:g} m high; projectile: {1e3 * setup['projectile_mass']:g} g"
     )
     if hand := card["launch"]:
         print(f"draw in {hand['pull_time_s']:.1f} s, wait {hand['pause_s']:.1f} s, let go")

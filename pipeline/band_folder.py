@@ -110,9 +110,8 @@ def write(pair: Pair, root: str | Path = ".") -> dict:
     with replacing_folder(layout.card(pair)) as temporary:
         folder = BandFolder(temporary)
         stored, policy = Stored(layout.policy(pair)), Stored.of_band(temporary)
-        sizes = {name: getattr(found.band, name) for name in SIZES}
-        other = kept(found.settings, pair.method)
-        BandFile(sizes, found.band.preconditioned, (), other).save(folder.band_file)
+        sizes = {name: getattr(found.band, name) for name in (*SIZES, "preconditioned")}
+        BandFile(**sizes, settings=kept(found.settings, pair.method)).save(folder.band_file)
         found.save(folder.theta)
         shutil.copyfile(stored.network, policy.network)
         shutil.copyfile(stored.card_file, policy.card_file)

@@ -2,8 +2,6 @@
 from .api.csv_folder import episode_from_csv as episode_from_csv
 from .api.episodes import episode_from_arrays as episode_from_arrays
 from .api.episodes import read_mcap as read_mcap
-from .api.exporting import Exported as Exported
-from .api.exporting import export as export
 from .api.identification import Identification as Identification
 from .api.identification import Interval as Interval
 from .api.identify import identify as identify
@@ -22,6 +20,8 @@ from .api.simulation import simulate as simulate
 from .api.simulation import simulate_batch as simulate_batch
 from .base.errors import UserError as UserError
 from .episode.episode import Episode as Episode
+from .exporting.export import Exported as Exported
+from .exporting.export import export as export
 from .identification.posterior.launches import Observed as Observed
 from .identification.results.theta import Mounting as Mounting
 from .settings import Settings as Settings

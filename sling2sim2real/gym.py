@@ -61,7 +61,7 @@ def slingshots(
     if simulated or randomize:
         surface = SimulatedLandings(launcher, setup)
     else:
-        surface = model.landing_map.surface
+        surface = model.landing_map
     seen = params.state == "projectile_target"
     return SlingshotVectorEnv(
         surface,

@@ -3,20 +3,18 @@
     python -m stages.policy band1-paper
 
 Reads data/theta/<pair>.json, and data/clamps/ of its recording; writes data/policies/<pair>/:
-policy.onnx (metres to metres), card.json, map.parquet (launches over the box) and training.parquet.
-A killed training begins anew: it takes seconds. SLING_DEVICE says where launches are simulated; PPO
-runs on one thread of the CPU.
+policy.onnx (metres to metres) and card.json. A killed training begins anew: it takes seconds.
+SLING_DEVICE says where launches are simulated; PPO runs on one thread of the CPU.
 """
 
 from __future__ import annotations
 
-from functools import partial
-
 from pipeline.layout import Layout
 from sling2sim2real.base.machine import device
 from sling2sim2real.base.progress import Progress
-from sling2sim2real.identification.results.theta import load_theta
-from sling2sim2real.launching.surface.simulator import asked_of_the_hand, simulator
+from sling2sim2real.identification.results.theta import history_of, load_theta
+from sling2sim2real.launching.surface.simulator import simulator
+from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.policy.make import make_policy
 from stages.start import pair_of_stage, run
 
@@ -29,13 +27,13 @@ def main() -> None:
     clamps, theta = layout.clamps(pair), load_theta(layout.theta(pair), band)
     iterations = params.policy.iterations
     how = make_policy(
-        layout.policy(pair),
+        Stored(layout.policy(pair)),
         simulator(params, band, theta, clamps, device=device()),
         params,
         band,
         pair.method,
         theta,
-        asked=partial(asked_of_the_hand, params, band, theta, clamps=clamps),
+        history=history_of(params, theta),
         progress=Progress(f"policy-{pair.key}", iterations, "iterations", every=EVERY),
     )
     print(f"{pair.key}: {how}")

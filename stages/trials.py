@@ -10,13 +10,16 @@ every method and policy. Without any launch the simulator predicts the policy's 
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import partial
 
 import numpy as np
+from pyarrow import parquet
 
 from pipeline.layout import Layout
 from pipeline.params import load
 from rig.physics.launch import Trial, launch
+from sling2sim2real.base.files import replacing
 from sling2sim2real.base.launches_file import read_launches
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.theta import load_samples, load_theta, parameters_of
@@ -29,35 +32,35 @@ from stages.start import pair_of_stage, run
 
 def main() -> None:
     params, pair = pair_of_stage()
-    band_params, fork_width = params.bands[pair.band], params.setup.fork_width
+    band_params = params.bands[pair.band]
     layout = Layout()
     theta = load_theta(layout.theta(pair), pair.band)
     samples = load_samples(layout.confidence(pair), parameters_of(theta))
     episodes = Episode.load_all(layout.episodes(pair))
     stored = Stored(layout.policy(pair))
 
-    batches = trials.scored(read_launches(layout.launches(pair.band)), pair.method)
+    rows = trials.scored(read_launches(layout.launches(pair.band)), pair.method)
     if band_params.source == "rig":
         targets = np.repeat(params.trials.targets, params.trials.repeats).tolist()
         aimed = trials.aimed(stored, targets)
-        batches = [trials.launch_virtually(aimed, partial(_launch, pair.band)), *batches]
-    batches = batches or [trials.aimed(stored, list(params.trials.targets))]
+        rows = [*trials.launch_virtually(aimed, partial(_launch, pair.band)), *rows]
+    rows = rows or trials.aimed(stored, params.trials.targets)
 
     launcher = simulator(params, pair.band, theta, layout.clamps(pair))
-    launches, intervals = trials.predict(batches, launcher, samples, params)
-    draws = np.concatenate([batch.draws for batch in batches])
+    rows = trials.predicted(rows, launcher, samples, params)
+    sizes = params.setup.fork_width, band_params.rest_length
+    places = np.insert(trials.draws_of(rows), 0, 0, axis=1)
     table = trials.table(
-        pair.band,
-        pair.method,
-        batches,
-        predicted=launches,
-        intervals=intervals,
-        stretch=stretch_of(np.insert(draws, 0, 0, axis=1), fork_width, band_params.rest_length),
-        recorded=recorded_stretch(episodes, fork_width, band_params.rest_length),
+        rows,
+        stretch_of(places, *sizes),
+        band=pair.band,
+        method=pair.method,
+        recorded_stretch=recorded_stretch(episodes, *sizes),
     )
-    trials.save(table, layout.trials(pair))
-    counts = [f"{batch.kind} {len(batch.draws)}" for batch in batches]
-    print(f"{pair.key}: launches: {', '.join(counts)}")
+    with replacing(layout.trials(pair)) as temporary:
+        parquet.write_table(table, temporary)
+    counts = Counter(row["kind"] for row in rows)
+    print(f"{pair.key}: launches: {', '.join(f'{kind} {n}' for kind, n in counts.items())}")
 
 
 def _launch(band: str, draw: np.ndarray, number: int) -> Trial:

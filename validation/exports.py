@@ -14,11 +14,11 @@ from pathlib import Path
 
 from pipeline.band_folder import identified
 from pipeline.params import load
-from sling2sim2real.api.exporting import export
 from sling2sim2real.base import errors
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.machine import device
 from sling2sim2real.exporting.card import ASKED
+from sling2sim2real.exporting.export import export
 from validation.reports import write_report
 
 REPORT = "reports/validation/export-{}.json"

@@ -51,8 +51,7 @@ class Leg:
 
 def legs_of(plan: Path) -> tuple[list[Leg], Leg]:
     """The phases of a plan's trajectory.csv, and where it begins."""
-    frame = json.loads((plan / "waypoints.json").read_text())["header"]["frame_id"]
-    if frame == NO_ROBOT:
+    if json.loads((plan / "plan.json").read_text())["frame"] == NO_ROBOT:
         raise ValueError(f"{plan}: is in frame O, not in a robot's base: `sling setup`, plan again")
     with (plan / "trajectory.csv").open(newline="") as file:
         rows = [

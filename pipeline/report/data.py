@@ -27,7 +27,6 @@ from sling2sim2real.drawing.styles import Styles, styles
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.identification.results.theta import load_theta
 from sling2sim2real.identification.searches.regions import Region, load_regions
-from sling2sim2real.launching.surface.landing_map import LandingMap
 from sling2sim2real.launching.surface.stored import Stored
 
 PRINTED = ("geom", "force", "work")  # the paper's loss is their sum (docs/method.md)
@@ -54,7 +53,6 @@ class Result:
         regions: Where the refinement began; none for a search of one phase.
         axes: Names of the regions' axes in the unit cube.
         policy: Its files, which tell draws of targets; `card` is what they say of it.
-        landing_map: Simulated launches over the box of draws.
     """
 
     pair: Pair
@@ -64,7 +62,6 @@ class Result:
     axes: list[str]
     policy: Stored
     card: dict
-    landing_map: LandingMap
 
     @property
     def band(self) -> str:
@@ -202,5 +199,4 @@ def _result(params: Params, layout: Layout, pair: Pair) -> Result:
         axes=axes,
         policy=policy,
         card=policy.card(),
-        landing_map=LandingMap.load(made(policy.folder / "map.parquet")),
     )

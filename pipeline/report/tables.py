@@ -418,21 +418,24 @@ def losses(run: Run) -> pd.DataFrame:
 
 
 def policies(run: Run) -> pd.DataFrame:
-    """How each policy converged in its own simulator, and how well its map interpolates."""
+    """How each policy converged in its own simulator."""
     rows = []
     for result in run:
-        training, chart = result.card["training"], result.card["landing_map"]["target_range"]
-        errors = [
-            number(None if error is None else 100 * error, ".2f")
-            for content in (training, chart)
-            for error in (content["mean_error_m"], content["max_error_m"])
-        ]
-        converged = "yes" if training["converged"] else "**no**"
-        failed = str(training.get("failed_targets", NONE))
-        names = result.band, called(run, result.method)
-        rows.append([*names, converged, *errors[:2], failed, *errors[2:]])
-    heads = ["band", "method", "converged", "mean error [cm]", "largest [cm]", "failed targets"]
-    return pd.DataFrame(rows, columns=[*heads, "map error [cm]", "map's largest [cm]"])
+        training = result.card["training"]
+        errors = (training[name] for name in ("mean_error_m", "max_error_m"))
+        rows.append(
+            {
+                "band": result.band,
+                "method": called(run, result.method),
+                "converged": "yes" if training["converged"] else "**no**",
+                **{
+                    head: number(None if error is None else 100 * error, ".2f")
+                    for head, error in zip(("mean error [cm]", "largest [cm]"), errors, strict=True)
+                },
+                "failed targets": str(training.get("failed_targets", NONE)),
+            }
+        )
+    return pd.DataFrame(rows)
 
 
 def summary(run: Run) -> dict[str, float]:

@@ -77,7 +77,7 @@ class World:
     def landing_map(self, setup: SetupParams, size: tuple[int, int]) -> LandingMap:
         """Map launches without errors over the box of draws of `setup`."""
         box = {"draw_y": setup.draw_y, "draw_z": setup.draw_z, "max_force": setup.max_force}
-        return LandingMap.simulate(self.exact, **box, size=size, checks=0)
+        return LandingMap.simulate(self.exact, **box, size=size)
 
     def hits(self, targets: Sequence[float], starts: Sequence[np.ndarray]) -> np.ndarray:
         """Draws (T, 2) that land on T targets [m] without errors, each on the line of its start.

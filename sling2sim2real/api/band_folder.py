@@ -23,42 +23,45 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from ruamel.yaml import YAML, YAMLError
+from pydantic import ValidationError
+from ruamel.yaml import YAML
 
 from sling2sim2real.api.model import Band, with_band
-from sling2sim2real.base.errors import UserError, one_line
+from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import NotMade, replacing
 from sling2sim2real.base.fingerprint import fingerprint
 from sling2sim2real.base.launches_file import LaunchRow, read_launches
+from sling2sim2real.base.schema import LIST, explained, read_yaml
 from sling2sim2real.episode.episode import Episode
 from sling2sim2real.recording.files import SUFFIXES, sha256
 from sling2sim2real.recording.mask_folder import masks_beside
 from sling2sim2real.settings import Settings
+from sling2sim2real.settings.lab import BandSizes
 
 BANDS = Path("bands")  # in the working folder
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
-SIZES = {"mass": "kg, between the clamps", "diameter": "m", "rest_length": "m, between the clamps"}
+SIZES = "mass", "diameter", "rest_length"
 LIBRARY = Path(__file__).parents[1]
 RECORDED = ("setup", "episode", "cloud", "force")  # settings that an episode depends on
 
 
-@dataclass(frozen=True)
-class BandFile:
+class BandFile(BandSizes):
     """What band.yaml holds.
 
     Attributes:
-        sizes: mass [kg], diameter and rest_length [m].
-        preconditioned: As `Band` has it.
         assumed: Names of sizes that nobody has measured.
         settings: What differs from the lab's, by section.
     """
 
-    sizes: dict[str, float]
-    preconditioned: float | bool = False
-    assumed: tuple[str, ...] = ()
-    settings: Mapping[str, Any] | None = None
+    assumed: Annotated[tuple[str, ...], LIST] = ()
+    settings: dict[str, Any] = {}
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """mass [kg], diameter and rest_length [m]."""
+        return {name: getattr(self, name) for name in SIZES}
 
     def band(self, name: str) -> Band:
         """Raises UserError where no band has such sizes."""
@@ -67,44 +70,22 @@ class BandFile:
     def with_sizes(self, given: Mapping[str, float]) -> BandFile:
         """With other sizes, which are not assumed any more."""
         assumed = tuple(name for name in self.assumed if name not in given)
-        return BandFile({**self.sizes, **given}, self.preconditioned, assumed, self.settings)
+        return self.model_copy(update={**given, "assumed": assumed})
 
     def save(self, path: Path) -> None:
         """Write it; comments of an earlier one are lost."""
-        content: dict[str, Any] = {name: self.sizes[name] for name in SIZES}
-        if self.preconditioned:
-            content["preconditioned"] = self.preconditioned
-        if self.assumed:
-            content["assumed"] = list(self.assumed)
-        write_yaml(
-            path,
-            content | {"settings": plain(self.settings or {})},
-            "A band by scale, calliper and ruler [kg, m]; settings: what differs from lab.yaml",
-        )
+        told = self.model_dump(exclude_defaults=True) | {"settings": self.settings}
+        title = "A band by scale, calliper and ruler [kg, m]; settings: what differs from lab.yaml"
+        write_yaml(path, plain(told), title)
 
     @classmethod
     def load(cls, path: Path) -> BandFile:
         """Raises UserError: it cannot be read, or holds what it should not."""
-        content = read_yaml(path)
-        known = (*SIZES, "preconditioned", "assumed", "settings")
-        if unknown := [name for name in content if name not in known]:
-            raise UserError(f"{path}: unknown key {unknown[0]}; keys are {', '.join(known)}")
-        if missing := [name for name in SIZES if name not in content]:
-            raise UserError(f"{path}: {missing[0]} is missing ({SIZES[missing[0]]})")
-        settings, assumed = content.get("settings") or {}, content.get("assumed") or []
-        if not isinstance(settings, dict) or not isinstance(assumed, list):
-            raise UserError(f"{path}: settings must be a mapping, and assumed a list of names")
-        file = cls(
-            {name: content[name] for name in SIZES},
-            content.get("preconditioned", False),
-            tuple(map(str, assumed)),
-            settings,
-        )
+        content = {key: value for key, value in mapping_of(path).items() if value is not None}
         try:
-            file.band("band")
-        except UserError as error:
-            raise UserError(f"{path}: {str(error).removeprefix('Band: ')}") from error
-        return file
+            return cls.model_validate(content)
+        except ValidationError as error:
+            raise UserError(f"{path}: {explained(error, cls)}") from error
 
 
 @dataclass(frozen=True)
@@ -186,7 +167,7 @@ class BandFolder:
         """The same for another band.yaml."""
         settings = lab_settings(self.lab_file)
         try:
-            settings = settings.changed(**(file.settings or {}))
+            settings = settings.changed(**file.settings)
             return with_band(settings, file.band(self.name))
         except (UserError, TypeError) as error:
             raise UserError(f"{self.band_file}: {error}") from error
@@ -242,7 +223,7 @@ class BandFolder:
 
 def lab_settings(path: Path = BANDS / "lab.yaml") -> Settings:
     """The library's settings, with what a lab.yaml changes, if there is one. Raises UserError."""
-    return lab_settings_of(read_yaml(path) if path.is_file() else {}, path)
+    return lab_settings_of(mapping_of(path) if path.is_file() else {}, path)
 
 
 def lab_settings_of(content: Mapping[str, Any], path: Path) -> Settings:
@@ -272,16 +253,9 @@ def differences(settings: Settings, base: Settings) -> dict[str, Any]:
     return differing(settings.model_dump(), base.model_dump())
 
 
-def read_yaml(path: Path) -> dict[str, Any]:
+def mapping_of(path: Path) -> dict[str, Any]:
     """The mapping that a YAML file holds; of an empty one, nothing. Raises UserError."""
-    try:
-        content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-    except (YAMLError, ValueError, RecursionError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f", line {mark.line + 1}" if mark else ""
-        raise UserError(f"{path}{where}: not valid YAML ({one_line(error)[:120]})") from error
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror})") from error
+    content = read_yaml(path)
     if content is not None and not isinstance(content, dict):
         raise UserError(f"{path}: must hold a mapping, such as `setup:`")
     return content or {}

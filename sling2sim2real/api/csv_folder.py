@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 from pydantic import ValidationError
 
-from sling2sim2real.api.band_folder import read_yaml
+from sling2sim2real.api.band_folder import mapping_of
 from sling2sim2real.api.episodes import episode_from_arrays
 from sling2sim2real.base.errors import UserError, one_line
 from sling2sim2real.base.schema import LIST, Section, explained
@@ -84,7 +84,7 @@ def episode_from_csv(folder: str | Path, *, settings: Settings | None = None) ->
 
 def _about(path: Path) -> EpisodeFile:
     try:
-        return EpisodeFile.model_validate(read_yaml(path))
+        return EpisodeFile.model_validate(mapping_of(path))
     except ValidationError as error:
         raise UserError(f"{path}: {explained(error, EpisodeFile)}") from error
 

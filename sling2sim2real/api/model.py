@@ -227,7 +227,6 @@ class Model:
             draw_z=setup.draw_z,
             size=self.settings.policy.map_size,
             max_force=setup.max_force,
-            checks=0,
         )
 
     def launches(self, draws: np.ndarray, points: np.ndarray | None = None) -> Launches:

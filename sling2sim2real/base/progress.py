@@ -1,4 +1,4 @@
-"""What everything long says of itself: lines in logs/ and on stderr, on a terminal a bar.
+"""What everything long says of itself: lines in logs/ and on stderr.
 
     history-band1-de 48/600 rollouts  generation 4  best 0.43215  12.3 rollouts/s  0:45 left
 
@@ -12,9 +12,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
-BAR = 30  # characters
 LINE = re.compile(r"(?P<title>\S+) (?P<done>\d+)/(?P<total>\d+) (?P<unit>\w+)(?:  (?P<facts>.*))?")
 
 
@@ -51,14 +49,6 @@ def parse(line: str) -> Step | None:
         return None
     facts = tuple(match["facts"].split("  ")) if match["facts"] else ()
     return Step(match["title"], int(match["done"]), int(match["total"]), match["unit"], facts)
-
-
-class Advancing(Protocol):
-    """Is told how something long gets on."""
-
-    def advance(self, count: int, *facts: str) -> None:
-        """Tell of `count` more units, and `facts` of them."""
-        ...
 
 
 class Progress:
@@ -105,14 +95,7 @@ class Progress:
 
     def _tell(self, step: Step) -> None:
         self._write(step.counted)
-        if not sys.stderr.isatty():
-            print(step, file=sys.stderr, flush=True)
-            return
-        filled = BAR * step.done // step.total
-        bar = "#" * filled + "-" * (BAR - filled)
-        end = "\n" if step.done >= step.total else ""
-        shown = f"\r{step.title} [{bar}] {step.counted}\x1b[K"
-        print(shown, end=end, file=sys.stderr, flush=True)
+        print(step, file=sys.stderr, flush=True)
 
     def _write(self, line: str) -> None:
         with self.log.open("a", encoding="utf-8") as file:

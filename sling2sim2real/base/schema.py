@@ -23,7 +23,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from sling2sim2real.base.errors import one_line
+from sling2sim2real.base.errors import UserError, one_line
 from sling2sim2real.base.files import NotMade
 
 
@@ -55,6 +55,31 @@ def read_json(path: Path, model: type[Read]) -> Read:
         return model.model_validate(content)
     except ValidationError as error:
         raise NotMade(path, explained(error, model)) from error
+
+
+def read_yaml(path: Path) -> Any:
+    """What a YAML file holds. Raises UserError."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise UserError(f"{path}: no such file") from error
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not UTF-8 text"
+        raise UserError(f"{path}: cannot be read ({reason})") from error
+    return parse_yaml(text, str(path))
+
+
+def parse_yaml(text: str, name: str) -> Any:
+    """What a YAML text holds; `name` stands in error messages. Raises UserError."""
+    from ruamel.yaml import YAML, YAMLError  # the parser that DVC uses
+
+    try:
+        return YAML(typ="safe").load(text)
+    except (YAMLError, ValueError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f", line {mark.line + 1}" if mark else ""
+        what = getattr(error, "problem", None) or str(error).partition("\n")[0]
+        raise UserError(f"{name}{where}: not valid YAML ({what})") from error
 
 
 def refusal(message: str) -> PydanticCustomError:

@@ -136,7 +136,7 @@ def setup(arguments: argparse.Namespace) -> Done:
     from sling2sim2real.cli import setup
 
     measured = {name: getattr(arguments, name) for name in kinds.MEASURED}
-    done = setup.set_up(setup.LabMeasures(**measured, topics=arguments.topic))
+    done = setup.set_up(measured | {"topics": arguments.topic})
     return kinds.shown(done, True) if arguments.json else setup.shown(done)
 
 
@@ -281,9 +281,9 @@ def observe(arguments: argparse.Namespace) -> Done:
 )
 def export(arguments: argparse.Namespace) -> Done:
     from sling2sim2real.api.band_folder import BandFolder
-    from sling2sim2real.api.exporting import export
     from sling2sim2real.base.disk import expect_writable
     from sling2sim2real.cli.export import shown
+    from sling2sim2real.exporting.export import export
 
     found = found_of(arguments)
     folder = BandFolder.at(arguments.band)

@@ -11,10 +11,10 @@ import re
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
+from tabulate import tabulate
 
 from sling2sim2real.api.arguments import USUAL
 from sling2sim2real.api.band_folder import SIZES, BandFile, BandFolder
@@ -97,7 +97,6 @@ def fit(
         found = _with_policy(folder, found, steps)
     steps.begin(CARD)
     card = _card(folder, found, episodes)
-    steps.finish()
     _forget(folder)
     return card | {"card": str(folder.card / "README.md")}
 
@@ -139,7 +138,7 @@ def _file(folder: BandFolder, recordings: Sequence[Path], sizes: Mapping[str, fl
     if "mass" not in sizes:
         raise UserError(f"{folder.name}: is new; weigh the band and give --mass KG, such as 0.0408")
     assumed = tuple(name for name in SIZES if name not in sizes)
-    return BandFile({**USUAL, **sizes}, assumed=assumed)
+    return BandFile.model_validate({**USUAL, **sizes, "assumed": assumed})
 
 
 def _bring_in(
@@ -312,51 +311,9 @@ def _with_policy(folder: BandFolder, found: Identification, steps: Steps) -> Ide
     from sling2sim2real.policy.make import make_policy
 
     steps.begin(POLICY)
-    with replacing_folder(folder.path / "training") as temporary:
-        how = make_policy(
-            temporary,
-            partial(_launched, found),
-            settings,
-            name,
-            METHOD,
-            content,
-            asked=partial(_asked, found),
-            progress=_Training(steps, settings.policy.iterations),
-        )
-        for source, target in (("policy.onnx", stored.network), ("card.json", stored.card_file)):
-            os.replace(temporary / source, target)  # the card last: it says that both are there
-    steps.say(how)
+    history, whose = found.launch_setup.history, (settings, name, METHOD, content)
+    steps.say(make_policy(stored, found.launches, *whose, history=history))
     return replace(found, policy=stored)
-
-
-class _Training:
-    """Tells the bar of a training's iterations."""
-
-    def __init__(self, steps: Steps, total: int) -> None:
-        self.steps, self.total, self.done = steps, total, 0
-
-    def advance(self, count: int, *facts: str) -> None:
-        self.done += count
-        self.steps.inside(self.done / self.total)
-
-
-def _launched(found: Identification, draws: np.ndarray):
-    return found.launches(draws)
-
-
-def _asked(found: Identification, draw: np.ndarray) -> dict | None:
-    """How the hand must draw, and what a second more of pause moves the landing of a draw by."""
-    history = found.launch_setup.history
-    if history is None:
-        return None
-    launch = {"pull_time": history.pull_time, "pause": history.pause + 1}
-    longer = replace(found, settings=found.settings.changed(launch=launch))
-    moved = float(longer.launches(draw).landing_y[0] - found.launches(draw).landing_y[0])
-    return {
-        "pull_time_s": history.pull_time,
-        "pause_s": history.pause,
-        "second_more_m": moved if np.isfinite(moved) else None,
-    }
 
 
 def _card(folder: BandFolder, found: Identification, episodes: Sequence[Episode]) -> dict:
@@ -398,35 +355,24 @@ def _forget(folder: BandFolder) -> None:
 
 
 def shown(card: dict) -> str:
-    """What a card says, on one screen."""
-    reasons = [f"  - {reason}" for reason in card["reasons"]]
-    lines = [f"{card['band']}: {card['verdict']}", *reasons, ""]
-    width = max(len(value["label"]) for value in card["values"])
-    lines += [f"  {value['label']:{width}}  {_value(value)}" for value in card["values"]]
-    lines += ["", "  target     draw (y, z)           lands at   90 % interval       force"]
-    lines += [_draw(draw) for draw in card["draws"]]
+    """What a card says, on one screen: verdict, draws, advice; values stand on the card."""
+    draws = [
+        {
+            "target [m]": f"{row['target_m']:.3f}",
+            "draw y, z [m]": f"{row['draw_y_m']:.4f}, {row['draw_z_m']:.4f}",
+            "lands at [m]": _number(row["predicted_landing_m"], ".3f", "fails in simulation"),
+            "90 % interval": " to ".join(_number(end, ".3f") for end in row["interval_90_m"] or []),
+            "force [N]": _number(row["hold_force_n"], ".1f"),
+        }
+        for row in card["draws"]
+    ]
+    lines = [f"{card['band']}: {card['verdict']}", *(f"  - {reason}" for reason in card["reasons"])]
+    lines += ["", tabulate(draws, "keys", tablefmt="plain", disable_numparse=True)]
     if card["next"]:
         lines += ["", "What would help most:", *(f"  - {step}" for step in card["next"])]
     page = Path(card["card"]).with_name("index.html").resolve()
     return "\n".join([*lines, "", f"Card: {card['card']}", f"Page: {page.as_uri()}"])
 
 
-def _value(row: dict) -> str:
-    unit = f" {row['unit']}" if row["unit"] else ""
-    if row["fixed"]:
-        return f"{row['value']:.4g}{unit}, fixed"
-    if row["low"] is None:
-        return f"{row['value']:.4g}{unit}"
-    return f"{row['value']:.4g}{unit}  ({row['low']:.4g} to {row['high']:.4g})"
-
-
-def _draw(row: dict) -> str:
-    at = f"{row['draw_y_m']:.4f}, {row['draw_z_m']:.4f} m"
-    text = f"  {row['target_m']:.3f} m    {at}"
-    if row["predicted_landing_m"] is None:
-        return f"{text}    the launch fails in simulation"
-    ends = row["interval_90_m"]
-    interval = f"{ends[0]:.3f} to {ends[1]:.3f} m" if ends else "not known       "
-    return (
-        f"{text}    {row['predicted_landing_m']:.3f} m   {interval}    {row['hold_force_n']:.1f} N"
-    )
+def _number(value: float | None, form: str, otherwise: str = "") -> str:
+    return otherwise if value is None else format(value, form)

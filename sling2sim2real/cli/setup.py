@@ -7,7 +7,7 @@ base and in the camera, and its height above the floor. docs/recording.md, Calib
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,8 @@ from sling2sim2real.api.band_folder import (
     BANDS,
     lab_settings,
     lab_settings_of,
+    mapping_of,
     plain,
-    read_yaml,
     write_yaml,
 )
 from sling2sim2real.base.errors import UserError
@@ -37,41 +37,11 @@ DIGITS = 5  # hundredths of a millimetre
 Numbers = tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class LabMeasures:
-    """What was measured; None: not.
-
-    Attributes:
-        left_tip, right_tip: In the robot's base [m], as seen from the hand that looks at the fork.
-        fork_width: Between the tips, by a ruler [m].
-        base_to_camera: Pose of the colour camera's optical frame in the base: x y z qx qy qz qw.
-        camera_to_fork: Pose of frame O in that frame, where it was measured there.
-        floor: Height of the floor in the base [m].
-        max_force: That the arm may hold [N].
-        draw_y, draw_z: Box of draws that the arm reaches, frame O [m].
-        tool: What the force sensor carries: mass [kg] and its centre in the sensor's frame [m].
-        topics: Of the recordings, by role, where they are not found by type and rate.
-    """
-
-    left_tip: Numbers | None = None
-    right_tip: Numbers | None = None
-    fork_width: float | None = None
-    base_to_camera: Numbers | None = None
-    camera_to_fork: Numbers | None = None
-    floor: float | None = None
-    max_force: float | None = None
-    draw_y: Numbers | None = None
-    draw_z: Numbers | None = None
-    tool: Numbers | None = None
-    topics: tuple[tuple[str, str], ...] | None = None
-
-    @property
-    def nothing(self) -> bool:
-        return all(value is None for value in vars(self).values())
-
-
-def set_up(measured: LabMeasures, path: Path = BANDS / "lab.yaml") -> dict:
+def set_up(measured: Mapping[str, Any], path: Path = BANDS / "lab.yaml") -> dict:
     """Check what was measured and write it into lab.yaml, whose comments may be lost.
+
+    Args:
+        measured: What was given of arguments.MEASURED by name, and `topics` by role [m, N, kg].
 
     Returns:
         `file`; `changed`: by key, `old` and `new`; `checked`: what agrees, in words.
@@ -79,7 +49,8 @@ def set_up(measured: LabMeasures, path: Path = BANDS / "lab.yaml") -> dict:
     Raises:
         UserError: It contradicts itself or what is there; nothing is written.
     """
-    if measured.nothing:
+    measured = {name: value for name, value in measured.items() if value is not None}
+    if not measured:
         raise UserError(
             "nothing to set up: give what you measured, such as --left-tip=0.7,0.14,0.42"
             " --right-tip=0.7,-0.14,0.42"
@@ -92,7 +63,7 @@ def set_up(measured: LabMeasures, path: Path = BANDS / "lab.yaml") -> dict:
         for key, value in new.items()
         if old[key] != plain(value)
     }
-    content = read_yaml(path) if path.is_file() else {}
+    content = mapping_of(path) if path.is_file() else {}
     section = content.get("setup") or {}
     for key, change in changed.items():
         both = key == "topics" and isinstance(section.get(key), dict)
@@ -114,30 +85,34 @@ def shown(content: dict) -> str:
     return "\n".join([*lines, *(f"  {line}" for line in content["checked"])])
 
 
-def changes_of(measured: LabMeasures, setup: SetupParams) -> tuple[dict[str, Any], list[str]]:
+def changes_of(measured: Mapping[str, Any], setup: SetupParams) -> tuple[dict[str, Any], list[str]]:
     """New values of `setup`, by key, and what agrees, in words. Raises UserError."""
     new: dict[str, Any] = {}
     checked: list[str] = []
     for key in ("fork_width", "max_force", "draw_y", "draw_z"):
-        if getattr(measured, key) is not None:
-            new[key] = getattr(measured, key)
-    if measured.tool is not None:
-        new["tool"] = {"mass": measured.tool[0], "center": measured.tool[1:]}
-    if measured.topics:
-        new["topics"] = dict(measured.topics)
-    width = new.get("fork_width", setup.fork_width)
-    fork = None if setup.base_to_fork is None else Transform.of(setup.base_to_fork)
-    camera = None if measured.base_to_camera is None else Transform.of(measured.base_to_camera)
-    seen = None if measured.camera_to_fork is None else Transform.of(measured.camera_to_fork)
+        if key in measured:
+            new[key] = measured[key]
+    if tool := measured.get("tool"):
+        new["tool"] = {"mass": tool[0], "center": tool[1:]}
+    if topics := measured.get("topics"):
+        new["topics"] = dict(topics)
+    width, tips = new.get("fork_width", setup.fork_width), ("left_tip", "right_tip")
+    fork, camera, seen = (
+        pose and Transform.of(pose)
+        for pose in (
+            setup.base_to_fork, measured.get("base_to_camera"), measured.get("camera_to_fork")
+        )
+    )  # fmt: skip
 
-    if (measured.left_tip is None) != (measured.right_tip is None):
-        raise UserError("the fork needs both tips: give --left-tip and --right-tip")
-    if measured.left_tip is not None and measured.right_tip is not None:
-        tips = np.array(measured.left_tip), np.array(measured.right_tip)
-        fork = fork_of(*tips)
-        checked.append(_agreed_width(float(np.linalg.norm(tips[1] - tips[0])), measured, width))
+    if {*tips} <= {*measured}:
+        left, right = (np.array(measured[name]) for name in tips)
+        fork = fork_of(left, right)
+        answers = "--fork-width" if "fork_width" in new else "setup.fork_width"
+        checked.append(_agreed_width(float(np.linalg.norm(right - left)), width, answers))
         _expect_robot_behind(fork)
         new["base_to_fork"] = _pose(fork)
+    elif {*tips} & {*measured}:
+        raise UserError("the fork needs both tips: give --left-tip and --right-tip")
     elif camera is not None and seen is not None and fork is None:
         new["base_to_fork"] = _pose(camera @ seen)
     elif camera is not None and fork is None:
@@ -156,14 +131,14 @@ def changes_of(measured: LabMeasures, setup: SetupParams) -> tuple[dict[str, Any
         checked.append(_looks_at_the_fork(seen))
         new["camera_to_fork"] = _pose(seen)
 
-    if measured.floor is not None:
+    if (floor := measured.get("floor")) is not None:
         if fork is None:
             raise UserError(
                 "--floor: is in the robot's base, in which the fork is not known: give --left-tip"
                 " and --right-tip too, or set setup.fork_height, the tips' height above the floor"
             )
-        new["fork_height"] = _height(fork, measured.floor)
-    if seen is not None or measured.floor is not None:
+        new["fork_height"] = _height(fork, floor)
+    if seen is not None or floor is not None:
         _expect_above_the_floor(new, setup)
     return new, checked
 
@@ -190,10 +165,9 @@ def fork_of(left: np.ndarray, right: np.ndarray) -> Transform:
     return Transform(Rotation.from_matrix(axes), (left + right) / 2)
 
 
-def _agreed_width(apart: float, measured: LabMeasures, width: float) -> str:
+def _agreed_width(apart: float, width: float, answers: str) -> str:
     most = SURE * math.sqrt(2) * TOUCH
     if abs(apart - width) > most:
-        answers = "--fork-width" if measured.fork_width is not None else "setup.fork_width"
         off = 1e3 * abs(apart - width)
         raise UserError(
             f"the tips are {apart:.4f} m apart, {answers} is {width:.4f} m: {off:.1f} mm differ,"

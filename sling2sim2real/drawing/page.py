@@ -1,7 +1,6 @@
 """A text as one page without a network: its pictures are inside, and each chapter has a link.
 
-The content security policy forbids every request but for scripts beside the page. Equal inputs give
-equal bytes.
+The content security policy forbids every request and script. Equal inputs give equal bytes.
 """
 
 from __future__ import annotations
@@ -17,18 +16,11 @@ from sling2sim2real.base.template import filled
 HERE = Path(__file__).parent
 
 
-def page(
-    markdown: str,
-    folder: Path,
-    title: str,
-    *,
-    foot: str = "",
-) -> str:
+def page(markdown: str, folder: Path, title: str) -> str:
     """The page as HTML.
 
     Args:
         folder: Where the text's pictures lie.
-        foot: HTML at the end.
 
     Raises:
         UserError: A picture is missing.
@@ -40,7 +32,6 @@ def page(
         style=(HERE / "page.css").read_text("utf-8"),
         navigation="\n".join(f'<a href="#{id_}">{name}</a>' for id_, name in chapters),
         body=body,
-        foot=foot,
     )
 
 

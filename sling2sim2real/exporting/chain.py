@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sling2sim2real.api.model import Model
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.exporting.band import CalibratedBand
 from sling2sim2real.simulator.initial import hanging_line
 from sling2sim2real.simulator.model import GRAVITY
 from sling2sim2real.simulator.rubber import uniaxial
@@ -26,6 +26,16 @@ TIME_STEPS_S = (5e-4, 2.5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)  # s, of time
 STABILITY_LIMIT = 1.2
 MATCHED = {"strength": "N", "mooney_share": "", "damping_time": "s"}  # what a match finds; units
 KNEE_OF_STRAIN = 0.25  # of the largest strain: from there on a second spring helps the first
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A launch, frame O, SI units; NaN where nothing left the pouch."""
+
+    landing: float
+    speed: float
+    angle: float
+    hold_force: float
 
 
 @dataclass(frozen=True)
@@ -59,7 +69,7 @@ class SpringChain:
     step: float
 
     @classmethod
-    def of(cls, model: CalibratedBand, draws: np.ndarray, hold_force: np.ndarray) -> SpringChain:
+    def of(cls, model: Model, draws: np.ndarray, hold_force: np.ndarray) -> SpringChain:
         """A first guess: straight halves that pull with `hold_force` (N,) at draws (N, 2).
 
         Its damping time is θ's, its time step the largest that is stable with that.
@@ -85,7 +95,7 @@ class SpringChain:
         return replace(chain, step=chain.stable_step)
 
     @staticmethod
-    def tension(model: CalibratedBand, draws: np.ndarray, hold_force: np.ndarray) -> np.ndarray:
+    def tension(model: Model, draws: np.ndarray, hold_force: np.ndarray) -> np.ndarray:
         """Pull [N] and stretch, shape (2, N), of straight halves that the hand holds at draws."""
         setup, band = model.settings.setup, model.band
         distance = np.linalg.norm(draws, axis=1)

@@ -1,4 +1,4 @@
-"""Match a chain to the calibrated simulation: the same hold, the same launches."""
+"""Match a chain to the calibrated simulation, and prove it: the same hold, the same launches."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
+from sling2sim2real.api.model import Model
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.exporting.band import CalibratedBand
-from sling2sim2real.exporting.chain import MATCHED, SpringChain
+from sling2sim2real.exporting.chain import MATCHED, Shot, SpringChain
 from sling2sim2real.exporting.mujoco_replay import MujocoBand
-from sling2sim2real.exporting.replay import Shot
+from sling2sim2real.exporting.newton_replay import NewtonReplay
 from sling2sim2real.simulator.launch import Launches
 
 DRAWS_A_SIDE = 5  # draws along y and z over the box
@@ -42,7 +42,30 @@ class DrawCompared:
         return {name: theirs / ours - 1 for name, (ours, theirs) in pairs.items()}
 
 
-def draws_of(model: CalibratedBand) -> tuple[np.ndarray, Launches]:
+@dataclass(frozen=True)
+class Matched:
+    """What the match and the proof came to.
+
+    Attributes:
+        chain: Matched.
+        match: Draws that it was matched to.
+        proof: Draws that it was not, flown to the floor.
+        finer: Largest relative change of the proof's landings with half the time step.
+        engine: Name and version.
+    """
+
+    chain: SpringChain
+    match: Sequence[DrawCompared]
+    proof: Sequence[DrawCompared]
+    finer: float
+    engine: str
+
+    @property
+    def met(self) -> bool:
+        return within_limits(self.proof)
+
+
+def draws_of(model: Model) -> tuple[np.ndarray, Launches]:
     """Draws (N, 2) of a grid over the box that land around the targets, and their launches.
 
     Those that the arm may hold. Raises UserError where there are too few.
@@ -72,7 +95,7 @@ def within_limits(proof: Sequence[DrawCompared]) -> bool:
 
 
 def compared(
-    model: CalibratedBand, draws: np.ndarray, shots: list[Shot], theta: np.ndarray | None = None
+    model: Model, draws: np.ndarray, shots: list[Shot], theta: np.ndarray | None = None
 ) -> list[DrawCompared]:
     """Shots of draws (N, 2) beside what the calibrated simulation does there.
 
@@ -91,7 +114,7 @@ def compared(
     ]
 
 
-def matched(model: CalibratedBand) -> SpringChain:
+def matched(model: Model) -> SpringChain:
     """The chain whose held forces and landings around the targets are nearest to ours.
 
     Raises:
@@ -142,7 +165,7 @@ def _fitted(start: SpringChain, draws: np.ndarray, ours: Launches) -> SpringChai
     return chain_at(solution.x)
 
 
-def proof_draws(model: CalibratedBand) -> np.ndarray:
+def proof_draws(model: Model) -> np.ndarray:
     """A draw for each of three targets that no match has seen, shape (3, 2).
 
     The farther the target, the farther from the fork along y; along z what lands nearest.
@@ -162,3 +185,17 @@ def proof_draws(model: CalibratedBand) -> np.ndarray:
             )
         nearest.append(draws[np.nanargmin(miss)])
     return np.array(nearest)
+
+
+def proven(model: Model, replay: MujocoBand | NewtonReplay, proof: np.ndarray) -> Matched:
+    """What a matched chain's replay leaves of the match's draws and of those of `proof` (N, 2)."""
+    (draws, _), shots = draws_of(model), replay.launches(proof, fly=True)
+    finer = replay.finer.launches(proof)
+    moved = [half.landing / shot.landing - 1 for half, shot in zip(finer, shots, strict=True)]
+    return Matched(
+        chain=replay.chain,
+        match=compared(model, draws, replay.launches(draws)),
+        proof=compared(model, proof, shots),
+        finer=max(map(abs, moved)),
+        engine=replay.engine,
+    )

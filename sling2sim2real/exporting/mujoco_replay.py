@@ -11,8 +11,7 @@ import numpy as np
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.exporting import mjcf
-from sling2sim2real.exporting.chain import SpringChain
-from sling2sim2real.exporting.replay import Shot
+from sling2sim2real.exporting.chain import Shot, SpringChain
 from sling2sim2real.simulator.launch import ballistic_landing
 
 HANG_S = 3.0  # s for the slack band
@@ -78,7 +77,7 @@ class MujocoBand:
         return MujocoBand(replace(self.chain, step=self.chain.step / 2))
 
     def launches(self, draws: np.ndarray, *, fly: bool = False) -> list[Shot]:
-        """Launch as ChainReplay.launches does."""
+        """Draw to each of (N, 2) and let go; MuJoCo flies the projectiles, or a parabola does."""
         return [self.launch(draw, fly=fly) for draw in draws]
 
     def launch(self, draw, *, fly: bool = False) -> Shot:

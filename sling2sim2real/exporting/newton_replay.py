@@ -9,8 +9,7 @@ from types import ModuleType
 import numpy as np
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.exporting.chain import SpringChain
-from sling2sim2real.exporting.replay import Shot
+from sling2sim2real.exporting.chain import Shot, SpringChain
 
 
 def numbers(name: str, chain: SpringChain, draws: np.ndarray) -> dict:
@@ -60,7 +59,7 @@ class NewtonReplay:
         return NewtonReplay(replace(self.chain, step=self.chain.step / 2), self.device)
 
     def launches(self, draws: np.ndarray, *, fly: bool = True) -> list[Shot]:
-        """All at once, as ChainReplay.launches; Newton always flies them."""
+        """Draw to each of (N, 2) and let go, all at once; Newton always flies them."""
         bands = self._module.SpringBands(self._numbers, len(draws), self.device)
         hold_force = bands.draw(draws)
         landing, left = bands.launch()

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from sling2sim2real.api.model import Model
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import replacing
-from sling2sim2real.exporting.band import CalibratedBand
-from sling2sim2real.exporting.chain import SpringChain
+from sling2sim2real.exporting.chain import Shot, SpringChain
 from sling2sim2real.exporting.match import (
     HOLD_LIMIT,
     LANDING_LIMIT,
@@ -27,7 +27,7 @@ from sling2sim2real.exporting.match import (
     within_limits,
 )
 from sling2sim2real.exporting.mujoco_replay import MujocoBand
-from sling2sim2real.exporting.replay import ChainReplay, Shot
+from sling2sim2real.exporting.newton_replay import NewtonReplay
 from sling2sim2real.quantities import rounded
 from sling2sim2real.simulator.launch import Launches
 
@@ -37,7 +37,7 @@ REPLAYED = 3  # from the weakest to the strongest
 FEWEST = 4  # draws of a sample that land
 
 
-def expect(model: CalibratedBand, count: int, to: str) -> None:
+def expect(model: Model, count: int, to: str) -> None:
     """Raises UserError where so many samples cannot be written for an engine."""
     sampled = getattr(model, "sampled", None)
     there = 0 if sampled is None else len(sampled)
@@ -51,12 +51,12 @@ def expect(model: CalibratedBand, count: int, to: str) -> None:
 
 
 def write(
-    model: CalibratedBand,
+    model: Model,
     chain: SpringChain,
     folder: Path,
     count: int,
     *,
-    replay: Callable[[SpringChain], ChainReplay],
+    replay: Callable[[SpringChain], MujocoBand | NewtonReplay],
     columns: Callable[[SpringChain], Mapping],
     proof: np.ndarray,
 ) -> dict | None:
@@ -97,7 +97,7 @@ def write(
     return {"count": count, "replayed": replayed, "met": met}
 
 
-def carried(model: CalibratedBand, chain: SpringChain, points: np.ndarray) -> list[SpringChain]:
+def carried(model: Model, chain: SpringChain, points: np.ndarray) -> list[SpringChain]:
     """The chain of each θ of `points` (M, P), by the sensitivity of the matched one."""
     draws, ours = draws_of(model)
     there, best = _told(MujocoBand(chain).launches(draws)), _told(ours)

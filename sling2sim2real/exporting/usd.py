@@ -8,7 +8,7 @@ each tetrahedron,
 with Lame's mu and lam and the rotation R in F. It is stiffer than rubber when stretched, so that
 Young's modulus is scaled until a straight string of it holds as the calibrated simulation does.
 Where PhysX is at hand, modulus, mass, rest length and the clamps' height are then matched in it
-(ENTRY_POINTS).
+(MATCH).
 
 The stage opens with the straight band at rest: a volume whose `points` are bent while it is opened
 collapses across in PhysX (reports/validation/export-usd-causes.json), and holds too little. So the
@@ -18,19 +18,16 @@ ends are nodes to be led, not attachments; nodes.json says which, and where.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from pathlib import Path
 
 import numpy as np
 
+from sling2sim2real.api.model import Model
 from sling2sim2real.base.files import write_json, write_text
 from sling2sim2real.base.imported import imported
-from sling2sim2real.exporting import values as export_values
-from sling2sim2real.exporting.band import CalibratedBand
-from sling2sim2real.exporting.card import ASKED, compared_row, readme
+from sling2sim2real.exporting.card import ASKED, FRAMES, compared_row, identified, readme
 from sling2sim2real.exporting.chain import SpringChain
 from sling2sim2real.exporting.match import DrawCompared, draws_of, within_limits
 from sling2sim2real.exporting.mesh import Tube
@@ -44,7 +41,7 @@ TARGET_MARGIN = 1.2  # times nearer and farther than policy.targets: landings th
 # What stages that are matched on paper alone leave in PhysX, least and most over three virtual
 # bands and three draws each: reports/validation/export-usd.json.
 ON_PAPER = {"hold_force": (0.02, 0.16), "landing": (0.01, 0.21)}
-ENTRY_POINTS = "sling2sim2real.matches"  # functions that match an export in its engine
+MATCH = "sling2sim2real.engines.physx.match:matched"  # in PhysX; None where that is not there
 
 
 @dataclass(frozen=True)
@@ -99,7 +96,7 @@ class UsdMatch:
         return within_limits(self.proof)
 
 
-def to_usd(model: CalibratedBand, folder: Path, _: int) -> dict:
+def to_usd(model: Model, folder: Path, _: int) -> dict:
     """<band>.usda, nodes.json, and README.md: what it is, and what it is not."""
     draws, ours = near_draws(model)
     tension, stretch = SpringChain.tension(model, draws, ours.hold_force)
@@ -109,26 +106,19 @@ def to_usd(model: CalibratedBand, folder: Path, _: int) -> dict:
     tube = Tube.of(model.sling, EDGES, GRADING)
     on_paper = float(np.sum(tension / unit) / len(draws))
     band = start = UsdBand(tube, on_paper, poisson, theta["dynamic_friction"])
-    match = match_of("usd")
-    done = match and match(model, band)
+    done: UsdMatch | None = imported(MATCH)(model, band)
     if done:
         band = done.band
     name = f"{model.band.name}.usda"
     write_text(folder / name, text(band))
     write_json(folder / "nodes.json", nodes(band))
     left = on_paper * unit / tension - 1
-    content = {
-        "band": model.band.name,
-        "target": "usd",
-        "files": {
-            name: "the model",
-            "nodes.json": "where it hangs, and which nodes clamps and hand lead",
-            "README.md": "what it is, and what it is not",
-        },
-        "frames": export_values.FRAMES,
-        "sizes": export_values.sizes(model),
-        "law": model.parameters.law,
-        "values": export_values.values(model),
+    files = {
+        name: "the model",
+        "nodes.json": "where it hangs, and which nodes clamps and hand lead",
+        "README.md": "what it is, and what it is not",
+    }
+    content = identified(model, "usd", files) | {
         "replayed": done is not None,
         "matched": [
             {"name": "youngs_modulus", "value": rounded(band.young, 6), "unit": "Pa"},
@@ -158,25 +148,17 @@ def to_usd(model: CalibratedBand, folder: Path, _: int) -> dict:
     return content
 
 
-def near_draws(model: CalibratedBand) -> tuple[np.ndarray, Launches]:
+def near_draws(model: Model) -> tuple[np.ndarray, Launches]:
     """What `draws_of` gives, near policy.targets alone; all where that is too few."""
     (draws, ours), (near, far) = draws_of(model), model.settings.policy.targets
     good = (ours.landing_y > near / TARGET_MARGIN) & (ours.landing_y < far * TARGET_MARGIN)
     return (draws[good], ours[good]) if good.sum() > 2 else (draws, ours)
 
 
-def match_of(target: str) -> Callable[[CalibratedBand, UsdBand], UsdMatch | None] | None:
-    """What an installed package offers to match a target in its engine; None: nothing."""
-    with suppress(ModuleNotFoundError):  # a light install lacks what the engine's side needs
-        for entry in entry_points(group=ENTRY_POINTS, name=target):
-            return imported(entry.value)
-    return None
-
-
 def nodes(band: UsdBand) -> dict:
     """Numbers of the nodes that are led, and places (V, 3) [m] of the hanging band."""
     return {
-        "frame": export_values.FRAMES,
+        "frame": FRAMES,
         "ends": band.tube.ends.tolist(),
         "hand": band.tube.hand.tolist(),
         "hanging_m": np.round(band.tube.clamped.reshape(-1, 3), 9).tolist(),

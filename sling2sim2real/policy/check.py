@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sling2sim2real.launching.surface.landing_map import Launcher
-from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE
+from sling2sim2real.launching.surface.landing_map import TOO_MUCH_FORCE, Launcher
 from sling2sim2real.policy.train import CHECKED_TARGETS, Policy, Trained
 from sling2sim2real.settings import Settings
 

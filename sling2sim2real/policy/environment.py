@@ -20,7 +20,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.launching.surface.response_surface import Landings
+from sling2sim2real.launching.surface.landing_map import Landings
 from sling2sim2real.launching.surface.simulated import Source
 from sling2sim2real.settings.lab import SetupParams
 from sling2sim2real.settings.launches import Reward

@@ -11,15 +11,15 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 import torch
 from torch import nn
 
 from sling2sim2real.base.files import replacing, write_json
+from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.policy.train import Policy, Trained
 from sling2sim2real.settings import Settings
 from sling2sim2real.settings.provenance import policy_settings_of
+from sling2sim2real.simulator.model import LaunchHistory
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 
 OPSET, IR_VERSION = 18, 10  # any onnxruntime from 1.18 (2024) on reads these
@@ -30,18 +30,16 @@ USED = ("sling2sim2real", "torch", "rsl-rl-lib", "onnx", "numpy")
 
 
 def export(
-    trained: Trained, folder: Path, params: Settings, band: str, method: str, theta: dict, **more
+    trained: Trained, stored: Stored, params: Settings, band: str, method: str, theta: dict, **more
 ) -> None:
-    """Write a policy's files into `folder`: network and curve, and last its card.
+    """Write a policy's files: the network, then its card, which says that both are there.
 
     Args:
         params, band, method, theta, more: As `card` has them.
     """
-    with replacing(folder / "training.parquet") as temporary:
-        pq.write_table(pa.table(trained.curve), temporary)
-    write_onnx(trained.policy, folder / "policy.onnx")
+    write_onnx(trained.policy, stored.network)
     content = card(trained.policy, params, band, method, theta, **more)
-    write_json(folder / "card.json", content)
+    write_json(stored.card_file, content)
 
 
 def write_onnx(policy: Policy, path: Path) -> None:
@@ -110,8 +108,7 @@ def card(
     theta: dict,
     *,
     training: dict,
-    landing_map: dict,
-    launch: dict | None = None,
+    history: LaunchHistory | None = None,
     device: str = "cpu",
 ) -> dict:
     """What a user of the files must know; no dates and no wall times: it is reproducible.
@@ -120,22 +117,18 @@ def card(
         params: The whole of params.yaml.
         theta: Content of the theta file whose simulator the policy was trained in.
         training: What `check.figures` says of it; NaN becomes null.
-        landing_map: How well the interpolated launches go with simulated ones
-            (`landing_map.validation`).
-        launch: How the hand must draw the band (`surface.simulator.asked_of_the_hand`), where its
-            law remembers that.
+        history: How the hand must draw the band, where its law remembers that.
         device: Where it was trained, "cpu" or "cuda".
     """
     center, half = policy.draw_center, policy.draw_half
     low, high = (np.round((center + sign * half).tolist(), 6).tolist() for sign in (-1, 1))
-    setup, band_params = params.setup, params.bands[band]
     return {
         "band": band,
         "method": method,
         "theta": theta["theta"],
         "law": theta.get("law", NEO_HOOKEAN),
         "nuisances": theta.get("nuisances", {}),
-        "launch": launch,
+        "launch": history and {"pull_time_s": history.pull_time, "pause_s": history.pause},
         "input": {
             "name": INPUT,
             "unit": "m",
@@ -154,19 +147,9 @@ def card(
             "low": low,
             "high": high,
         },
-        "max_force_n": setup.max_force,
+        "max_force_n": params.setup.max_force,
         "made_with": policy_settings_of(params, band),
-        "setup": {
-            "fork_width_m": setup.fork_width,
-            "fork_height_m": setup.fork_height,
-            "projectile_mass_kg": setup.projectile_mass,
-            "arm_stiffness_n_m": setup.arm_stiffness,
-            "band_mass_kg": band_params.mass,
-            "band_diameter_m": band_params.diameter,
-            "band_rest_length_m": band_params.rest_length,
-        },
         "training": _strict(training),
-        "landing_map": landing_map,
         "trained_on": {"device": device},
         "versions": {name: version(name).partition("+")[0] for name in USED},
     }

@@ -2,71 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-
-import numpy as np
-
 from sling2sim2real.base.machine import kind
-from sling2sim2real.base.progress import Advancing
-from sling2sim2real.launching.surface.landing_map import LandingMap, Launcher, validation
+from sling2sim2real.base.progress import Progress
+from sling2sim2real.launching.surface.landing_map import LandingMap, Launcher
 from sling2sim2real.launching.surface.simulated import SimulatedLandings
+from sling2sim2real.launching.surface.stored import Stored
 from sling2sim2real.policy.check import check, figures, verdict
 from sling2sim2real.policy.environment import projectile_start
 from sling2sim2real.policy.export import export
 from sling2sim2real.policy.train import train
 from sling2sim2real.settings import Settings
+from sling2sim2real.simulator.model import LaunchHistory
 
 
 def make_policy(
-    folder: Path,
+    stored: Stored,
     launcher: Launcher,
     params: Settings,
     band: str,
     method: str,
     theta: dict,
     *,
-    asked: Callable[[np.ndarray], dict | None],
-    progress: Advancing | None = None,
+    history: LaunchHistory | None,
+    progress: Progress | None = None,
 ) -> str:
-    """Write policy.onnx, card.json, map.parquet and training.parquet; return how it went.
+    """Write a policy's network and card; return how it went.
 
     Args:
-        folder: Of these files.
+        stored: Where they are to lie.
         launcher: Simulates draws (N, 2) [m] of the calibrated band.
         params, band, method, theta: As `policy.export.card` has them.
-        asked: What a launch from the middle target's draw (2,) [m] asks of the hand, for the card.
+        history: How the hand must draw the band, where its law remembers that.
         progress: Told of each iteration.
     """
     settings = params.policy
-    landing_map = LandingMap.simulate(
-        launcher,
-        draw_y=params.setup.draw_y,
-        draw_z=params.setup.draw_z,
-        size=settings.map_size,
-        max_force=params.setup.max_force,
-        seed=settings.seed,
-    )
-    surface = landing_map.surface
-    if settings.landings == "simulated":  # the map then shows what the simulator does, no more
-        surface = SimulatedLandings(launcher, params.setup)
+    setup = params.setup
+    if settings.landings == "simulated":
+        surface = SimulatedLandings(launcher, setup)
+    else:
+        box = {"draw_y": setup.draw_y, "draw_z": setup.draw_z, "max_force": setup.max_force}
+        surface = LandingMap.simulate(launcher, **box, size=settings.map_size)
     seen = settings.state == "projectile_target"
-    start = projectile_start(params.setup, params.bands[band]) if seen else None
+    start = projectile_start(setup, params.bands[band]) if seen else None
     trained = train(surface, settings, progress, projectile=start)
     checked = check(trained.policy, launcher, params)
     training = figures(trained, checked, settings.landings)
-    landing_map.save(folder / "map.parquet", {"band": band, "method": method})
-    middle = trained.policy.draws(np.mean(settings.targets, keepdims=True))[0]
     export(
         trained,
-        folder,
+        stored,
         params,
         band,
         method,
         theta,
         training=training,
-        landing_map=validation(landing_map, settings.targets),
-        launch=asked(middle),
+        history=history,
         device=kind(),
     )
     return verdict(training, checked.failures)

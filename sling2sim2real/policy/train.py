@@ -22,7 +22,7 @@ from rsl_rl.utils import check_nan
 from torch import nn
 
 from sling2sim2real.base.machine import one_thread
-from sling2sim2real.base.progress import Advancing
+from sling2sim2real.base.progress import Progress
 from sling2sim2real.launching.surface.simulated import Source
 from sling2sim2real.policy.environment import SlingshotVectorEnv, draw_box, rewarded
 from sling2sim2real.policy.ppo import RslEnv, settings
@@ -103,7 +103,7 @@ class Trained:
 def train(
     surface: Source,
     params: PolicyParams,
-    progress: Advancing | None = None,
+    progress: Progress | None = None,
     *,
     projectile: tuple[float, float] | None = None,
 ) -> Trained:

@@ -7,10 +7,17 @@ from pathlib import Path
 from typing import ClassVar, Self
 
 from pydantic import Field, ValidationError, model_validator
-from ruamel.yaml import YAML, YAMLError
 
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.schema import FolderName, Name, Section, explained, refusal
+from sling2sim2real.base.schema import (
+    FolderName,
+    Name,
+    Section,
+    explained,
+    parse_yaml,
+    read_yaml,
+    refusal,
+)
 from sling2sim2real.base.target import TARGET_AREA
 from sling2sim2real.settings.identification import (
     LossParams,
@@ -103,25 +110,15 @@ class Settings(Section):
         Raises:
             UserError: It cannot be read, or a key is wrong.
         """
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-        except FileNotFoundError as error:
-            raise UserError(f"{path}: no such file") from error
-        except (OSError, UnicodeDecodeError) as error:
-            reason = getattr(error, "strerror", None) or "not UTF-8 text"
-            raise UserError(f"{path}: cannot be read ({reason})") from error
-        return cls.parse(text, str(path))
+        return cls._of_file(read_yaml(Path(path)), str(path))
 
     @classmethod
     def parse(cls, text: str, name: str = "params.yaml") -> Self:
         """Settings of a YAML text; `name` stands in error messages. Raises UserError."""
-        try:
-            content = YAML(typ="safe").load(text)  # the parser that DVC uses
-        except (YAMLError, ValueError, RecursionError) as error:
-            mark = getattr(error, "problem_mark", None)
-            where = f", line {mark.line + 1}" if mark else ""
-            what = getattr(error, "problem", None) or str(error).partition("\n")[0]
-            raise UserError(f"{name}{where}: not valid YAML ({what})") from error
+        return cls._of_file(parse_yaml(text, name), name)
+
+    @classmethod
+    def _of_file(cls, content: object, name: str) -> Self:
         if isinstance(content, Mapping):
             content = {key: it for key, it in content.items() if key not in cls.passed_over}
         return cls.checked(content, name)

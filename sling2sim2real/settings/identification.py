@@ -37,7 +37,10 @@ SEARCHES = {  # what the rows of each are called, and its function
 }
 OWN = "own"  # any other: a function of the user's
 OUR_ENGINE = "sling"
-ENGINES = OUR_ENGINE, "physx"
+ENGINES = {  # what simulates
+    OUR_ENGINE: "sling2sim2real.identification.objective.evaluate:simulated",
+    "physx": "sling2sim2real.engines.physx.rollouts:simulate",
+}
 
 
 class SlingParams(Section):
@@ -166,7 +169,7 @@ class MethodDefaults(Section):
 
     law: Law = "corotated"
     search: Annotated[str, _one_of((*SEARCHES,), "function")] = "multistart"
-    engine: Annotated[str, _one_of(ENGINES, "function")] = "sling"
+    engine: Annotated[str, _one_of((*ENGINES,), "function")] = "sling"
     settings: dict[str, Setting] = {}
     fixed: dict[str, Value] = {}
     bounds: dict[str, Bounds] = {}

@@ -32,12 +32,17 @@ def _lies_beside(name: str) -> str:
 FileName = Annotated[str, FILLED, AfterValidator(_lies_beside)]
 
 
-class BandParams(Section):
-    source: Literal["recording", "rig"]
+class BandSizes(Section):
+    """By scale, calliper and ruler [kg, m]; `preconditioned` as the simulator has it."""
+
     mass: Annotated[float, Range(1e-4, 1)]
     diameter: Annotated[float, Range(5e-4, 0.05)]
     rest_length: Annotated[float, Range(0.05, 3)]
     preconditioned: bool | Annotated[float, Range(0, 3)] = False
+
+
+class BandParams(BandSizes):
+    source: Literal["recording", "rig"]
 
     @property
     def density(self) -> float:

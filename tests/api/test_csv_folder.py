@@ -98,7 +98,7 @@ def changed(folder, tmp_path, name: str, content: bytes | None):
         ),
         ("force.csv", b"time,fx,fy,fz\n1,0,0,0\n", "force_time: must be at least ten increasing"),
         ("episode.yaml", b"camera: [1, 2, 3]\ngrasp: 1", "episode.yaml: grasp: unknown key"),
-        ("episode.yaml", None, "episode.yaml: cannot be read"),
+        ("episode.yaml", None, "episode.yaml: no such file"),
         ("clouds/first.npy", b"", "first.npy: its name must be a stamp"),
         ("clouds/10.000.npy", b"", r"10.000.npy: cannot be read"),
         (

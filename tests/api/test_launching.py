@@ -107,10 +107,8 @@ def test_the_policy_in_a_bands_folder_is_asked(world, tmp_path) -> None:
 
 
 def put_card(file, theta: dict) -> None:
-    error = {"draws": 1, "mean_error_m": 0.0, "max_error_m": 0.0}
     card = {
         "training": {"converged": True, "mean_error_m": 0.0, "max_error_m": 0.0},
-        "landing_map": {"box": error, "target_range": error},
         "theta": theta,
     }
     file.write_text(json.dumps(card))

@@ -1,6 +1,5 @@
 """Lines of long things: what they say, that they are read back, and that they are not too many."""
 
-import sys
 from pathlib import Path
 
 import pytest
@@ -50,17 +49,6 @@ def test_lines_are_told_no_more_often_than_asked_but_the_last_is(clock, capsys) 
     steps = [parse(line) for line in capsys.readouterr().err.splitlines()]
     assert [step.done for step in steps] == [1, 9, 17, 25, 26]
     assert {step.facts[0] for step in steps} == {"8.0 iterations/s"}
-
-
-def test_a_terminal_has_a_bar(clock, capsys, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    summary = Progress("x", 2, "rollouts")
-    for _ in range(2):
-        clock.now += 1.0
-        summary.advance(1)
-    half, whole = capsys.readouterr().err.split("\r")[1:]
-    assert half.startswith(f"x [{'#' * 15}{'-' * 15}] 1/2 rollouts") and "\n" not in half
-    assert whole.startswith(f"x [{'#' * 30}] 2/2 rollouts") and whole.endswith("\n")
 
 
 def test_what_is_told_is_read_back_and_other_lines_are_no_steps() -> None:

@@ -71,7 +71,7 @@ def test_the_plan_of_a_recording_holds_the_same_draw_alike(tmp_path) -> None:
         with plan.write(tmp_path, 100.0)[0].open(newline="") as file:
             drawn = next(row for row in csv.DictReader(file) if row["phase"] == "pause")
         pose = at(*draw, standing)
-        assert pose["tcp_frame"] == plan.frame
+        assert pose["tcp_frame"] == plan.about["frame"]
         columns = "x y z", "qx qy qz qw"
         position, turn = ([float(drawn[name]) for name in names.split()] for names in columns)
         np.testing.assert_allclose(pose["tcp_position_m"], position, atol=1e-6)

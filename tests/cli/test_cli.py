@@ -103,7 +103,7 @@ def test_a_band_that_is_not_identified_yet_says_how(tmp_path: Path, refused) -> 
     folder = tmp_path / "bands/mine"
     folder.mkdir(parents=True)
     sizes = {"mass": 0.02, "diameter": 0.01, "rest_length": 0.5}
-    BandFile(sizes).save(folder / "band.yaml")
+    BandFile(**sizes).save(folder / "band.yaml")
     for command in ("aim bands/mine --target 1.9", "export bands/mine --to mjcf"):
         line = refused(1, *command.split(), folder=tmp_path)
         assert line.endswith("mine is not identified yet: `sling fit bands/mine`")

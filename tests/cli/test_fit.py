@@ -96,7 +96,7 @@ def test_another_size_is_a_new_fit_of_a_known_band(copied) -> None:
 def test_what_a_band_changes_of_the_lab_holds_for_it(copied) -> None:
     file = BandFile.load(TOY / "band.yaml")
     other = {"trials": {"targets": [1.8]}}
-    BandFile(file.sizes, settings=other).save(TOY / "band.yaml")
+    BandFile(**file.sizes, settings=other).save(TOY / "band.yaml")
     card = fit(BandFolder(TOY))
     assert [draw["target_m"] for draw in card["draws"]] == [1.8]
     assert card["assumed"] == []
@@ -217,8 +217,12 @@ def test_a_mistake_in_a_file_is_named_by_the_file(copied) -> None:
     for path, text, words in (
         ("bands/lab.yaml", "setup: {fork_widht: 0.3}\n", "lab.yaml: setup.fork_widht: unknown key"),
         ("bands/lab.yaml", "setup: [\n", "lab.yaml, line 2: not valid YAML"),
-        ("bands/toy/band.yaml", "mass: 0.03\n", "band.yaml: diameter is missing (m)"),
-        ("bands/toy/band.yaml", "mas: 0.03\n", "band.yaml: unknown key mas"),
+        ("bands/toy/band.yaml", "mass: 0.03\n", "band.yaml: diameter: is missing"),
+        (
+            "bands/toy/band.yaml",
+            "mas: 0.03\n",
+            "band.yaml: mas: unknown key, the closest",
+        ),
         (
             "bands/toy/band.yaml",
             "{mass: 30, diameter: 0.01, rest_length: 0.5}\n",
@@ -227,7 +231,7 @@ def test_a_mistake_in_a_file_is_named_by_the_file(copied) -> None:
         (
             "bands/toy/launches.csv",
             "draw_y,draw_z,landing\n-0.3,-0.1,\n",
-            "launches.csv, line 2: a launch that did not land is no evidence",
+            "launches.csv, line 2: a launch that did not land, without a speed, is no",
         ),
         ("bands/toy/launches.csv", "draw_y,landing\n", "launches.csv: lacks the column draw_z"),
     ):
@@ -244,12 +248,6 @@ CARD = {
     "band": "mine",
     "verdict": "with care",
     "reasons": ["It is not settled."],
-    "values": [
-        {"label": "stiffness E", "unit": "kPa", "value": 412.3, "low": 401, "high": 423.4}
-        | {"fixed": False},
-        {"label": "Poisson's ratio", "unit": "", "value": 0.47, "low": None, "high": None}
-        | {"fixed": True},
-    ],
     "draws": [
         {"target_m": 1.725, "draw_y_m": -0.3, "draw_z_m": -0.15, "predicted_landing_m": 1.726}
         | {"interval_90_m": [1.6, 1.9], "hold_force_n": 9.06},
@@ -264,11 +262,7 @@ def test_the_screen() -> None:
     text = shown(CARD | {"card": "bands/mine/card/README.md"})
     lines = text.splitlines()
     assert lines[:2] == ["mine: with care", "  - It is not settled."]
-    assert "  stiffness E      412.3 kPa  (401 to 423.4)" in lines
-    assert "  Poisson's ratio  0.47, fixed" in lines
-    assert any(
-        "1.725 m" in line and "1.600 to 1.900 m" in line and "9.1 N" in line for line in lines
-    )
+    assert any("1.725" in x and "1.600 to 1.900" in x and x.endswith("9.1") for x in lines)
     assert any("fails in simulation" in line for line in lines)
     assert lines[-2] == "Card: bands/mine/card/README.md" and len(lines) < 25
     assert re.fullmatch(r"Page: file://(/.*/bands/mine/card/index\.html)", lines[-1])

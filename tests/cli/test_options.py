@@ -128,8 +128,7 @@ def echo(patch: pytest.MonkeyPatch) -> None:
     """What takes long says what it was given."""
 
     def fit(*given, **more) -> dict:
-        values = [{"label": repr((given, more)), "unit": "", "value": 1.0, "low": None}]
-        return CARD | {"values": [values[0] | {"fixed": True}], "card": "README.md"}
+        return CARD | {"band": repr((given, more)), "card": "README.md"}
 
     def look_at(*given) -> Look:
         return Look(new_report(given[0], given[2].facts) | {"notes": [repr(given[2:])]})
@@ -140,7 +139,7 @@ def echo(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("sling2sim2real.cli.fit.fit", fit)
     patch.setattr("sling2sim2real.cli.observe.fit", lambda folder: None)
     patch.setattr("sling2sim2real.cli.preflight.command.look_at", look_at)
-    patch.setattr("sling2sim2real.api.exporting.export", export)
+    patch.setattr("sling2sim2real.exporting.export.export", export)
     patch.setattr("sling2sim2real.cli.view.view", lambda *given: repr(given[1]))
 
 

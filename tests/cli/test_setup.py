@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from sling2sim2real.api.band_folder import lab_settings
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.cli.setup import LabMeasures, fork_of, set_up, shown
+from sling2sim2real.cli.setup import fork_of, set_up, shown
 
 LEFT, RIGHT = (0.70, 0.1375, 0.42), (0.70, -0.1375, 0.42)  # the target along the base's x
 FORK = (0.7, 0, 0.42, 0, 0, -(0.5**0.5), 0.5**0.5)
@@ -48,7 +48,7 @@ def test_the_fork_is_where_its_tips_are(x, y, z, width, yaw) -> None:
 
 
 def test_everything_is_written_and_nothing_else_changes(path) -> None:
-    measured = LabMeasures(
+    measured = dict(
         left_tip=LEFT,
         right_tip=RIGHT,
         base_to_camera=LOOKING_DOWN,
@@ -81,29 +81,29 @@ def test_everything_is_written_and_nothing_else_changes(path) -> None:
 
 def test_a_tool_and_topics_are_taken_down(path) -> None:
     tool, topics = (0.7, 0.0, 0.0, 0.05), (("wrench", "/ft"), ("pose", "/tcp"))
-    set_up(LabMeasures(tool=tool, topics=topics), path)
-    set_up(LabMeasures(topics=(("pose", "/ee"),)), path)
+    set_up(dict(tool=tool, topics=topics), path)
+    set_up(dict(topics=(("pose", "/ee"),)), path)
     setup = lab_settings(path).setup
     assert (setup.tool.mass, setup.tool.center) == (0.7, (0.0, 0.0, 0.05))
     assert (setup.topics.wrench, setup.topics.pose) == ("/ft", "/ee")
     with pytest.raises(UserError, match="setup.tool.mass: must be between 0 and 20, got 700"):
-        set_up(LabMeasures(tool=(700, 0.0, 0.0, 0.05)), path)
+        set_up(dict(tool=(700, 0.0, 0.0, 0.05)), path)
 
 
 def test_two_of_three_poses_give_the_fork_in_the_base(path) -> None:
     """By way of the camera alone: no tip was touched."""
     seen = (0.0, 0.0, 0.98, 0.5**0.5, 0.5**0.5, 0.0, 0.0)
-    set_up(LabMeasures(base_to_camera=LOOKING_DOWN, camera_to_fork=seen, floor=-0.1), path)
+    set_up(dict(base_to_camera=LOOKING_DOWN, camera_to_fork=seen, floor=-0.1), path)
     setup = lab_settings(path).setup
     assert setup.base_to_fork == pytest.approx(FORK, abs=1e-5)
     assert setup.fork_height == pytest.approx(0.52)
     touched = {"left_tip": LEFT, "right_tip": RIGHT, "base_to_camera": LOOKING_DOWN}
-    done = set_up(LabMeasures(**touched, camera_to_fork=(0.005, *seen[1:])), path)
+    done = set_up(dict(**touched, camera_to_fork=(0.005, *seen[1:])), path)
     assert any(
         "agree: the fork as seen by way of the camera lies 5.0 mm" in x for x in done["checked"]
     )
     with pytest.raises(UserError, match=r"lies 50.0 mm and 0.00 degrees off .*measure the tips or"):
-        set_up(LabMeasures(**touched, camera_to_fork=(0.05, *seen[1:])), path)
+        set_up(dict(**touched, camera_to_fork=(0.05, *seen[1:])), path)
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_two_of_three_poses_give_the_fork_in_the_base(path) -> None:
 def test_what_contradicts_is_one_line_and_nothing_is_written(path, measured, words) -> None:
     before = path.read_bytes()
     with pytest.raises(UserError) as caught:
-        set_up(LabMeasures(**measured), path)
+        set_up(measured, path)
     assert words in str(caught.value) and "\n" not in str(caught.value)
     assert path.read_bytes() == before
 

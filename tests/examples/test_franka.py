@@ -103,7 +103,7 @@ def test_the_fake_is_told_the_plan(execute, planned, monkeypatch) -> None:
     assert run(execute, monkeypatch, fake, folder) == 0
     moves = [call[1] for call in fake.summary if call[0] == "move"]
     assert moves[0][0] == "joints"
-    rows = plan.rows()
+    rows = plan.about["phases"]
     ways = [row for row in rows if row["max_speed_m_s"] > 0]
     for (place, turn), row in zip(moves[2:], ways, strict=True):
         np.testing.assert_allclose(place, row["base"], atol=2e-4)  # of a sample after it
@@ -114,7 +114,7 @@ def test_the_fake_is_told_the_plan(execute, planned, monkeypatch) -> None:
         ("grasp", 0.0),
         ("open", 0.08),
     ]
-    assert fingers[1][3] == plan.grip_force
+    assert fingers[1][3] == load(DEFAULTS).setup.grip_force
     limits = [call[1] for call in fake.summary if call[0] == "limit"]
     assert max(limits[::2]) <= max(row["max_speed_m_s"] for row in rows) + 1e-9
 
@@ -217,7 +217,7 @@ def test_a_simulated_franka_ends_each_phase_where_the_plan_does(planned, tmp_pat
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=400)
     assert done.returncode == 0, done.stderr
     track = np.array(json.loads(done.stdout.splitlines()[-1])["track"])
-    rows = {row["phase"]: row for row in plan.rows()}
+    rows = {row["phase"]: row for row in plan.about["phases"]}
     for name, near in (("approach", 0.001), ("lift", 0.004), ("pull", 0.001)):
         off = np.linalg.norm(track[:, 1:4] - rows[name]["base"], axis=1)
         assert off.min() < near, name

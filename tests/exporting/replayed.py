@@ -10,11 +10,11 @@ from sling2sim2real.exporting.chain import SpringChain
 from sling2sim2real.exporting.match import (
     HOLD_LIMIT,
     LANDING_LIMIT,
+    Matched,
     compared,
     draws_of,
     proof_draws,
 )
-from sling2sim2real.exporting.proof import Matched
 
 DRAW = np.array([-0.35, -0.15])
 

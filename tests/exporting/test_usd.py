@@ -1,16 +1,12 @@
 """PhysX's USD: valid by usd-core and by PhysX's own schemas; its law on paper."""
 
 import json
-import math
-import tomllib
 from collections import Counter
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sling2sim2real import export
-from sling2sim2real.base.imported import imported
 from sling2sim2real.exporting import usd
 from sling2sim2real.exporting.match import DrawCompared
 from sling2sim2real.exporting.mesh import Tube
@@ -23,15 +19,8 @@ from tests.project import ROOT
 def done(model, tmp_path_factory):
     """As without PhysX, wherever the test runs."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(usd, "match_of", lambda target: None)
+        patch.setattr("sling2sim2real.engines.physx.match.matched", lambda model, band: None)
         return export(model, "usd", tmp_path_factory.mktemp("exports") / "toy")
-
-
-def test_the_project_offers_its_match_in_physx() -> None:
-    from sling2sim2real.engines.physx import match
-
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert imported(project["entry-points"][usd.ENTRY_POINTS]["usd"]) is match.matched
 
 
 def test_its_law_is_hookes_when_small_and_stiffer_than_rubber_when_large() -> None:
@@ -115,18 +104,6 @@ def test_its_nodes_hang_between_the_clamps(done) -> None:
     )
 
 
-def test_a_match_is_offered_by_an_entry_point_whose_module_can_be_imported(monkeypatch) -> None:
-    offered = {"usd": "math:sqrt", "newton": "no_such_module:match"}
-
-    def entry_points(group: str, name: str) -> list:
-        assert group == usd.ENTRY_POINTS
-        return [SimpleNamespace(value=offered[name])] if name in offered else []
-
-    monkeypatch.setattr(usd, "entry_points", entry_points)
-    assert usd.match_of("usd") is math.sqrt
-    assert usd.match_of("newton") is usd.match_of("mjcf") is None
-
-
 def test_a_launch_that_is_lost_in_the_engine_is_a_gap_in_the_card(
     model, tmp_path, monkeypatch
 ) -> None:
@@ -135,7 +112,7 @@ def test_a_launch_that_is_lost_in_the_engine_is_a_gap_in_the_card(
         landed = DrawCompared((-0.3, -0.1), (6.0, 6.1), (4.0, 4.1), (1.0, 1.1))
         return usd.UsdMatch(band, [landed], [lost, landed], [landed], "an engine")
 
-    monkeypatch.setattr(usd, "match_of", lambda target: match)
+    monkeypatch.setattr("sling2sim2real.engines.physx.match.matched", match)
     done = export(model, "usd", tmp_path / "usd")
     assert done.met is False and done.card["proof"][0]["landing_error"] is None
     text = (done.folder / "README.md").read_text()

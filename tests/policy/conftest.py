@@ -38,7 +38,7 @@ def toy_map() -> LandingMap:
 def trained(toy_map, tmp_path_factory: pytest.TempPathFactory):
     from sling2sim2real.policy.train import train
 
-    return once.value(tmp_path_factory, "trained", lambda _: train(toy_map.surface, SETTINGS))
+    return once.value(tmp_path_factory, "trained", lambda _: train(toy_map, SETTINGS))
 
 
 @pytest.fixture(scope="session")
@@ -49,5 +49,5 @@ def seeing(toy_map, tmp_path_factory: pytest.TempPathFactory):
     return once.value(
         tmp_path_factory,
         "seeing",
-        lambda _: train(toy_map.surface, SETTINGS, projectile=toy.START),
+        lambda _: train(toy_map, SETTINGS, projectile=toy.START),
     )

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE
+from sling2sim2real.launching.surface.landing_map import TOO_MUCH_FORCE
 from sling2sim2real.policy.check import CONVERGED, PolicyCheck, check, figures, verdict
 from tests.policy import toy
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from sling2sim2real import UserError
-from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE, ResponseSurface
+from sling2sim2real.launching.surface.landing_map import TOO_MUCH_FORCE, LandingMap
 from sling2sim2real.launching.surface.simulated import SimulatedLandings
 from sling2sim2real.policy.environment import SlingshotVectorEnv, projectile_start
 from sling2sim2real.policy.ppo import RslEnv
@@ -21,10 +21,10 @@ LOW, HIGH = np.array([toy.DRAW_Y, toy.DRAW_Z]).T
 
 @pytest.fixture
 def env(toy_map) -> SlingshotVectorEnv:
-    return make(toy_map.surface)
+    return make(toy_map)
 
 
-def make(surface: ResponseSurface | SimulatedLandings, **changes) -> SlingshotVectorEnv:
+def make(surface: LandingMap | SimulatedLandings, **changes) -> SlingshotVectorEnv:
     usual = {"targets": TARGETS, "num_envs": 400, "reward": REWARD}
     return SlingshotVectorEnv(surface, **{**usual, **changes})
 
@@ -66,7 +66,7 @@ def test_targets_cover_the_range_change_every_step_and_follow_the_seed(env) -> N
 
 
 def test_the_draw_has_its_error_within_the_box(toy_map) -> None:
-    env = make(toy_map.surface, error=1e-3)
+    env = make(toy_map, error=1e-3)
     env.reset(seed=3)
     told = env.step(np.zeros((400, 2)))[-1]["draw"] - (LOW + HIGH) / 2
     assert told.std(axis=0) == pytest.approx([1e-3, 1e-3], rel=0.1)
@@ -93,8 +93,8 @@ def test_each_launch_has_a_sample_of_its_own() -> None:
 
 def test_rsl_rl_sees_the_same_launches(toy_map) -> None:
     """With the projectile in half boxes of draws before the target, as a group of its own."""
-    blind = RslEnv(make(toy_map.surface), seed=7)
-    seeing = RslEnv(make(toy_map.surface, projectile=(-0.25, -0.30)), seed=7)
+    blind = RslEnv(make(toy_map), seed=7)
+    seeing = RslEnv(make(toy_map, projectile=(-0.25, -0.30)), seed=7)
     assert (blind.groups, seeing.groups) == (["target"], ["projectile", "target"])
     first = seeing.get_observations()
     retained = first["target"].clone()

@@ -5,7 +5,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from ruamel.yaml import YAML
 
@@ -19,7 +18,7 @@ from tests.project import DEFAULTS
 POINT = (2e5, 0.47, 2e-3, 0.5, 0.6)
 STORED = Stored(Path("data/policies/band1-posterior"))
 FOLDER = STORED.folder
-FILES = {"card.json", "policy.onnx", "training.parquet", "map.parquet"}
+FILES = {"card.json", "policy.onnx"}
 
 
 @pytest.fixture
@@ -51,8 +50,6 @@ def test_a_policy_is_written_with_its_card(project, capsys) -> None:
         np.abs(landing - targets).mean(), 1e-3
     )
     assert len(capsys.readouterr().out.splitlines()) == 1
-    assert len(pq.read_table(FOLDER / "training.parquet")) == 12
-    assert len(pq.read_table(FOLDER / "map.parquet")) == 9 * 7 + 128  # policy.map_size, and checks
 
 
 def test_a_theta_whose_launches_all_fail_is_said_not_to_converge(project, capsys) -> None:

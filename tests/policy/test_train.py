@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE
+from sling2sim2real.launching.surface.landing_map import TOO_MUCH_FORCE
 from sling2sim2real.launching.surface.simulated import SimulatedLandings
 from sling2sim2real.policy.train import Trained, train
 from tests.policy import toy
@@ -53,7 +53,7 @@ def same(first: Trained, second: Trained) -> bool:
 
 
 def test_the_same_settings_give_the_same_training_and_each_counts(toy_map, settings) -> None:
-    surface = toy_map.surface
+    surface = toy_map
     once, again = (train(surface, short(settings)) for _ in range(2))
     assert same(once, again)
     rewards = [{**vars(settings.reward), name: value} for name, value in REWARD.items()]
@@ -92,12 +92,12 @@ def test_on_simulated_launches_it_hits_without_a_map(toy_map, settings) -> None:
 @pytest.mark.slow
 def test_a_learned_exploration_narrows_by_itself(toy_map, settings) -> None:
     learned = SimpleNamespace(**{**vars(settings), "exploration": "learned"})
-    trained = train(toy_map.surface, learned)
+    trained = train(toy_map, learned)
     std = np.array(trained.curve["std"])
     assert std[0] == pytest.approx(settings.init_std, rel=0.1)
     assert settings.final_std < std[-1] < 0.8 * std[0]
     other = SimpleNamespace(**{**vars(learned), "final_std": 0.1, "iterations": 2})
-    start = train(toy_map.surface, other).curve["std"]
+    start = train(toy_map, other).curve["std"]
     assert start == trained.curve["std"][:2]  # there is no schedule
     assert error_of(trained) < 0.1
 
@@ -111,7 +111,7 @@ def test_a_policy_that_sees_the_projectile_hits_too(seeing, trained, settings) -
 @pytest.mark.parametrize("first", [1, 8])
 def test_a_landing_that_is_no_number_is_refused(toy_map, settings, first: int) -> None:
     """Neither a policy of the iteration before nor a traceback of PyTorch comes of it."""
-    surface, calls = toy_map.surface, itertools.count(1)
+    surface, calls = toy_map, itertools.count(1)
 
     class Broken:
         reasons, low, high = surface.reasons, surface.low, surface.high

@@ -132,8 +132,7 @@ def template(tmp_path_factory) -> Path:
     (data / "confidence" / f"{PAIR}.json").write_text(json.dumps(posterior()))
 
     folder = data / "policies" / PAIR
-    chart = write_stored(folder)
-    chart.save(folder / "map.parquet")
+    write_stored(folder)
     launches().to_parquet(data / "trials" / f"{PAIR}.parquet")
     return root
 

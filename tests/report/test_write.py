@@ -101,7 +101,7 @@ def test_names_the_input_that_is_missing(root, params) -> None:
         f"episodes/{BAND}/plain/1/signals.parquet",
         *(f"{step}/{PAIR}.parquet" for step in ("evaluations", "trials")),
         *(f"{step}/{PAIR}.json" for step in ("clusters", "theta")),
-        *(f"policies/{PAIR}/{file}" for file in ("card.json", "map.parquet")),
+        f"policies/{PAIR}/card.json",
     ):
         away = (root / "data" / name).rename(root / "away")
         with pytest.raises(NotMade, match=f"{re.escape(name)}: missing"):

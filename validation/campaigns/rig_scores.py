@@ -70,7 +70,7 @@ def aimed(outcome: Calibrated, params: Params, targets: Sequence[float] = TARGET
     """Draws (T, 2) that a perfect policy would choose for targets; NaN where it finds none."""
     setup = params.setup
     box = {"draw_y": setup.draw_y, "draw_z": setup.draw_z, "max_force": setup.max_force}
-    landing_map = LandingMap.simulate(outcome, **box, size=MAP, checks=0)
+    landing_map = LandingMap.simulate(outcome, **box, size=MAP)
 
     def land(draw: np.ndarray) -> float:
         done = outcome(draw[None])

@@ -1,4 +1,4 @@
-"""A plan as files: CSV samples, ROS 2 messages as JSON."""
+"""A plan as files: samples as CSV, commands of the gripper as ROS 2 messages in JSON."""
 
 from __future__ import annotations
 
@@ -42,38 +42,6 @@ def csv_text(trajectory: Trajectory, base: Transform, hand: np.ndarray, rate: fl
     return text.getvalue()
 
 
-def trajectory_message(
-    trajectory: Trajectory, base: Transform, hand: np.ndarray, frame: str
-) -> dict:
-    """trajectory_msgs/MultiDOFJointTrajectory with a point at each knot of the spline.
-
-    The cubic through the positions and velocities of neighbouring points is the plan itself.
-    """
-    knots = trajectory.path.x
-    rotation = dict(zip("xyzw", map(float, hand), strict=True))
-
-    def vectors(derivative: int) -> list[dict]:
-        return [_vector(v) for v in base.rotation.apply(trajectory.position(knots, derivative))]
-
-    places = [_vector(v) for v in base.apply(trajectory.position(knots))]
-    rest = _vector(np.zeros(3))
-    return {
-        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": frame},
-        "joint_names": ["tcp"],
-        "points": [
-            {
-                "transforms": [{"translation": place, "rotation": rotation}],
-                "velocities": [{"linear": speed, "angular": rest}],
-                "accelerations": [{"linear": acceleration, "angular": rest}],
-                "time_from_start": _duration(time),
-            }
-            for time, place, speed, acceleration in zip(
-                knots, places, vectors(1), vectors(2), strict=True
-            )
-        ],
-    }
-
-
 def gripper_commands(
     trajectory: Trajectory, position: Callable[[float], float], force: float
 ) -> list[dict]:
@@ -94,11 +62,6 @@ def gripper_commands(
         }
         for time, opening in moments
     ]
-
-
-def _vector(v: np.ndarray) -> dict[str, float]:
-    x, y, z = (np.round(v, 12) + 0.0).tolist()  # no negative zeros
-    return {"x": x, "y": y, "z": z}
 
 
 def _duration(time: float) -> dict[str, int]:

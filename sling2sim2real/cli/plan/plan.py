@@ -20,7 +20,7 @@ from sling2sim2real.base.files import write_json, write_text
 from sling2sim2real.cli.arguments import PULLS
 from sling2sim2real.cli.command_line import say
 from sling2sim2real.cli.plan import limits, messages
-from sling2sim2real.cli.plan.force import Held, Prediction, predict
+from sling2sim2real.cli.plan.force import Held, predict
 from sling2sim2real.cli.plan.hand import along_pull, quaternion
 from sling2sim2real.cli.plan.pull import hanging_middle, trajectory_of
 from sling2sim2real.cli.plan.trajectory import Trajectory
@@ -28,7 +28,6 @@ from sling2sim2real.cli.preflight.check import MASS, expect_long
 from sling2sim2real.recording.frames import FORK
 from sling2sim2real.recording.transforms import Transform
 from sling2sim2real.settings import Settings
-from sling2sim2real.settings.lab import Gripper
 
 INFORMATIVE, PAPER = PULLS
 MOST_PULLS = 10  # a file of them is half a gigabyte
@@ -43,130 +42,55 @@ class Plan:
     """A recording to be made.
 
     Attributes:
-        band: Its name.
         trajectory: Of the tool centre point, frame O.
         base: Frame O to the robot's base; the identity where nothing tells it.
-        base_source: Where that came from, in words; None: from nowhere, all is in frame O.
-        frame: Name of the base, or of frame O.
-        hand: Orientation of the hand there, quaternion x, y, z, w.
-        gripper: Its settings.
-        stretch: Of the drawn band.
-        force: Predicted, to hold it.
-        max_force: That the arm may hold [N].
-        grip_force: Of each finger [N].
-        held_time, most_time: From grasp to release, and what the episode leaves for it [s].
-        hanging_source: Where the height of the hanging middle came from.
-        pull: Of PULLS.
-        dips: How many the pull has.
+        hand: Its orientation in the base, quaternion x, y, z, w.
+        commands: Of the gripper, as messages.gripper_commands has them.
+        about: What the plan says of itself, as `--json` prints it and plan.json keeps it.
     """
 
-    band: str
     trajectory: Trajectory
     base: Transform
-    base_source: str | None
-    frame: str
     hand: np.ndarray
-    gripper: Gripper
-    stretch: float
-    force: Prediction
-    max_force: float
-    grip_force: float
-    held_time: float
-    most_time: float
-    hanging_source: str
-    pull: str
-    dips: int
-
-    def rows(self) -> list[dict]:
-        """One row a phase, numbers in SI units."""
-        trajectory = self.trajectory
-        speeds, accelerations = trajectory.peaks(1), trajectory.peaks(2)
-        return [
-            {
-                "phase": phase.name,
-                "start_s": round(float(trajectory.times[i]), 6),
-                "end_s": round(float(trajectory.times[i + 1]), 6),
-                "fork": _plain(phase.to),
-                "base": _plain(self.base.apply(phase.to)),
-                "opening_m": float(phase.opening),
-                "max_speed_m_s": float(speeds[i]),
-                "max_acceleration_m_s2": float(accelerations[i]),
-            }
-            for i, phase in enumerate(trajectory.phases)
-        ]
-
-    def content(self) -> dict:
-        """Everything that the plan says of itself, for JSON."""
-        return {
-            "band": self.band,
-            "frame": self.frame,
-            "base_to_fork": self._fork_in_base,
-            "base_to_fork_source": self.base_source,
-            "orientation": _plain(self.hand),
-            "hanging_source": self.hanging_source,
-            "duration_s": round(self.trajectory.duration, 6),
-            "grasp_s": round(self.trajectory.start_of("grasp"), 6),
-            "release_s": round(self.trajectory.start_of("release"), 6),
-            "pulls": sum(phase.name == "release" for phase in self.trajectory.phases),
-            "held_s": round(self.held_time, 6),
-            "held_most_s": round(self.most_time, 6),
-            "pull": self.pull,
-            "dips": self.dips,
-            "stretch": self.stretch,
-            "hold_force_n": self.force.force,
-            "hold_force_source": self.force.source,
-            "max_force_n": self.max_force,
-            "phases": self.rows(),
-        }
-
-    @property
-    def _fork_in_base(self) -> list[float] | None:
-        if self.base_source is None:
-            return None
-        return [*_plain(self.base.translation), *_plain(quaternion(self.base.rotation))]
+    commands: list[dict]
+    about: dict
 
     def to_json(self, files: list[Path]) -> str:
-        written = [str(path) for path in files]
-        return json.dumps({**self.content(), "files": written}, indent=2, allow_nan=False)
+        written = {"files": [str(path) for path in files]}
+        return json.dumps(self.about | written, indent=2, allow_nan=False)
 
     def to_text(self, files: list[Path]) -> str:
-        places = "fork", "base"
+        about, places = self.about, ("fork", "base")
         table = [
-            {**row, **{place: " ".join(f"{v:+.4f}" for v in row[place]) for place in places}}
-            for row in self.rows()
+            row | {place: " ".join(f"{v:+.4f}" for v in row[place]) for place in places}
+            for row in about["phases"]
         ]
+        frame, force = about["frame"], about["hold_force_source"]
         heads = {name: name.replace("_", " ") for name in table[0]}
-        heads |= {"fork": "to, frame O [m]", "base": f"in {self.frame} [m]"}
-        force = self.force
-        holds = f"{force.force or 0:.1f} N of {self.max_force:g} N ({force.source})"
+        heads |= {"fork": "to, frame O [m]", "base": f"in {frame} [m]"}
+        if about["hold_force_n"] is not None:
+            force = f"{about['hold_force_n']:.1f} N of {about['max_force_n']:g} N ({force})"
+        source, dips = about["base_to_fork_source"], about["dips"]
         facts = {
-            "hand": f"{' '.join(f'{v:+.4f}' for v in self.hand)} (x y z w in {self.frame})",
-            "fork": f"in {self.frame} by {self.base_source}" if self.base_source else NO_BASE,
-            "middle": self.hanging_source,
-            "pull": f"{self.pull}, with {self.dips} dip{'s' * (self.dips != 1)}",
-            "window": f"grasp to release {self.held_time:.2f} s of {self.most_time:.2f} s",
-            "stretch": f"{self.stretch:.2f} of the rest length",
-            "force": force.source if force.force is None else holds,
+            "hand": f"{' '.join(f'{v:+.4f}' for v in self.hand)} (x y z w in {frame})",
+            "fork": f"in {frame} by {source}" if source else NO_BASE,
+            "middle": about["hanging_source"],
+            "pull": f"{about['pull']}, with {dips} dip{'s' * (dips != 1)}",
+            "window": f"grasp to release {about['held_s']:.2f} s of {about['held_most_s']:.2f} s",
+            "stretch": f"{about['stretch']:.2f} of the rest length",
+            "force": force,
         }
         lines = [tabulate(table, heads, tablefmt="plain", floatfmt=".3f"), ""]
         lines += [*(f"{name:<10}{value}" for name, value in facts.items()), ""]
         return "\n".join([*lines, *(f"wrote {path}" for path in files)])
 
     def write(self, folder: Path, rate: float) -> list[Path]:
-        """Write trajectory.csv, waypoints.json and gripper.json into a folder.
-
-        Everything is made before the first file is written. Raises UserError.
-        """
-        pose = self.trajectory, self.base, self.hand
-        table = messages.csv_text(*pose, rate)
-        waypoints = messages.trajectory_message(*pose, self.frame)
-        gripper = messages.gripper_commands(self.trajectory, self.gripper.command, self.grip_force)
-        names = ("trajectory.csv", "waypoints.json", "gripper.json")
-        files = [Path(folder, name) for name in names]
+        """Write trajectory.csv, gripper.json and plan.json into a folder. Raises UserError."""
+        files = [Path(folder, name) for name in ("trajectory.csv", "gripper.json", "plan.json")]
         try:
-            write_text(files[0], table)
-            write_json(files[1], waypoints)
-            write_json(files[2], gripper)
+            write_text(files[0], messages.csv_text(self.trajectory, self.base, self.hand, rate))
+            write_json(files[1], self.commands)
+            write_json(files[2], self.about)
         except OSError as error:
             raise UserError(f"{folder}: cannot be written ({error.strerror})") from error
         return files
@@ -253,24 +177,48 @@ def plan_recording(
     limits.check_force(setup, held, drawn, prediction)
     below = -hanging_middle(settings, setup, band)[2]
     by = "as a string's catenary" if settings.hanging is None else "plan.hanging"
-    return Plan(
-        band=band.name,
-        trajectory=trajectory,
-        base=base,
-        base_source=source,
-        frame=frame,
-        hand=quaternion(hand),
-        gripper=settings.gripper,
-        stretch=held.stretch(drawn),
-        force=prediction,
-        max_force=setup.max_force,
-        grip_force=setup.grip_force,
-        held_time=held_time,
-        most_time=most_time,
-        hanging_source=f"hangs {below:.3f} m below the tips ({by})",
-        pull=pull,
-        dips=len(dips),
-    )
+    turn, position = quaternion(hand), settings.gripper.command
+    about = {
+        "band": band.name,
+        "frame": frame,
+        "base_to_fork": source and [*_plain(base.translation), *_plain(quaternion(base.rotation))],
+        "base_to_fork_source": source,
+        "orientation": _plain(turn),
+        "hanging_source": f"hangs {below:.3f} m below the tips ({by})",
+        "duration_s": round(trajectory.duration, 6),
+        "grasp_s": round(trajectory.start_of("grasp"), 6),
+        "release_s": round(trajectory.start_of("release"), 6),
+        "pulls": pulls,
+        "held_s": round(held_time, 6),
+        "held_most_s": round(most_time, 6),
+        "pull": pull,
+        "dips": len(dips),
+        "stretch": held.stretch(drawn),
+        "hold_force_n": prediction.force,
+        "hold_force_source": prediction.source,
+        "max_force_n": setup.max_force,
+        "phases": _rows(trajectory, base),
+    }
+    commands = messages.gripper_commands(trajectory, position, setup.grip_force)
+    return Plan(trajectory, base, turn, commands, about)
+
+
+def _rows(trajectory: Trajectory, base: Transform) -> list[dict]:
+    """One row a phase, numbers in SI units."""
+    speeds, accelerations = trajectory.peaks(1), trajectory.peaks(2)
+    return [
+        {
+            "phase": phase.name,
+            "start_s": round(float(trajectory.times[i]), 6),
+            "end_s": round(float(trajectory.times[i + 1]), 6),
+            "fork": _plain(phase.to),
+            "base": _plain(base.apply(phase.to)),
+            "opening_m": float(phase.opening),
+            "max_speed_m_s": float(speeds[i]),
+            "max_acceleration_m_s2": float(accelerations[i]),
+        }
+        for i, phase in enumerate(trajectory.phases)
+    ]
 
 
 def _standing(params: Settings, found: Identification | None) -> tuple[Transform, str | None, str]:

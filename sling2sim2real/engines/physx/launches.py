@@ -3,7 +3,8 @@
 PhysX cannot free what it leads, so the pouch stays led: where a projectile would go that feels the
 band's force by PhysX's law (law.py) and gravity, with the mass of the held section. A step of the
 projectile follows each step of PhysX (leapfrog), until the band no longer pushes along the launch;
-the projectile then flies as ours does. The arm does not give way, and PhysX's band feels no air.
+the projectile then flies as ours does. The arm does not give way; PhysX's band has no damping here
+and feels no air.
 """
 
 from __future__ import annotations
@@ -51,13 +52,13 @@ class Flight:
         self.sling, self.setup, self.tube = sling, setup, tube
         self.start, self.step = np.asarray(places), 1 / STEPS_PER_S
         self.parameters = Parameters.of(NEO_HOOKEAN, thetas)
-        self.young, self.poisson, damping = np.asarray(thetas, float).T[:3]
-        self.delay, size = damping * STEPS_PER_S, len(places)
+        self.young, self.poisson = np.asarray(thetas, float).T[:2]
+        size = len(places)
         self.mass = setup.projectile_mass + tube.mass[tube.hand].sum()
         self.place = np.column_stack([np.zeros(size), self.start])
         self.direction = -self.place / np.linalg.norm(self.place, axis=1, keepdims=True)
         self.speed, self.time = np.zeros((size, 3)), 0.0  # half a step behind the place
-        self.before, self.last, self.burst = None, None, np.zeros(size, bool)
+        self.last, self.burst = None, np.zeros(size, bool)
         self.lanes = np.zeros(size, LANE)
         self.lanes["outcome"], self.lanes["lowest"] = Outcome.GOING_ON, self.place[:, 2]
 
@@ -68,9 +69,8 @@ class Flight:
         self.burst |= ~sound & self._going
         self.lanes["outcome"][~sound & self._going] = Outcome.NOT_CONVERGED
         nodes = np.where(sound[:, None, None, None], nodes, self.tube.rest)
-        first = self.before is None
-        step = None if first else (self.before, self.delay)
-        force = force_on(self.tube, [self.tube.middle], nodes, self.young, self.poisson, step=step)
+        first = self.last is None
+        force = force_on(self.tube, [self.tube.middle], nodes, self.young, self.poisson)
         if first:
             self.lanes["hold_force"] = self.last = force
         going = self._going
@@ -83,7 +83,7 @@ class Flight:
         pushed = force / self.mass - [0.0, 0.0, GRAVITY]
         self.speed = self.speed + np.where(going, kick * pushed, 0)
         self.place = self.place + np.where(going, self.step * self.speed, 0)
-        self.before, self.last, self.time = nodes, force, self.time + self.step
+        self.last, self.time = force, self.time + self.step
         return led_to(self.tube, self.place)
 
     def outcome(self) -> Launches:

@@ -29,33 +29,12 @@ def stress(gradient: np.ndarray, young, poisson) -> np.ndarray:
     return 2 * mu * off + lam * (volume - 1) * cofactor
 
 
-def viscous(before: np.ndarray, gradient: np.ndarray, delay, young, poisson) -> np.ndarray:
-    """Stress [Pa] of a step from gradients `before` (..., 3, 3), by elasticityDamping.
-
-    Each constraint C pulls as C + d C' would, J with d 2 mu / lam (compute_deltaLambdaXgradC).
-
-    Args:
-        delay: The damping d over the step's duration; fits (...), as the moduli do.
-    """
-    mu, delay = (np.asarray(factor)[..., None, None] for factor in (lame(young, poisson)[0], delay))
-    (off, volume, cofactor), (off_before, volume_before, _) = map(_strain, (gradient, before))
-    size, size_before = (
-        np.linalg.norm(strain, axis=(-2, -1), keepdims=True) for strain in (off, off_before)
-    )
-    along = off / np.maximum(size, 1e-12)
-    return 2 * mu * delay * ((size - size_before) * along + (volume - volume_before) * cofactor)
-
-
-def force_on(
-    tube: Tube, sections: list[int], positions: np.ndarray, young, poisson, *, step=None
-) -> np.ndarray:
+def force_on(tube: Tube, sections: list[int], positions: np.ndarray, young, poisson) -> np.ndarray:
     """Force of bands on what holds some of their sections [N].
 
     Args:
         positions: Of bands, shape (..., sections, V, 3).
         young, poisson: One a band or one for all; fit (...).
-        step: The positions a step before and the delay, as `viscous` takes it: with the viscous
-            force; None: the elastic one alone.
 
     Returns:
         Shape (..., 3).
@@ -67,10 +46,6 @@ def force_on(
     inverse = np.linalg.inv(before)
     moduli = [np.asarray(modulus)[..., None] for modulus in (young, poisson)]
     nominal = stress(gradient, *moduli)
-    if step is not None:
-        earlier, delay = step
-        past = _gradients(tube, near, earlier)[1]
-        nominal = nominal + viscous(past, gradient, np.asarray(delay)[..., None], *moduli)
     shares = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
     retained = shares * held.ravel()[near][..., None]
     return -np.einsum("t,...tij,tkj->...i", np.linalg.det(before) / 6, nominal, retained)

@@ -27,12 +27,13 @@ import numpy as np
 import warp as wp
 from scipy.optimize import lsq_linear
 
+from sling2sim2real.api.model import Model
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.engines.physx import scene
 from sling2sim2real.engines.physx.bands import INTERPRETER, Engine, release
 from sling2sim2real.engines.physx.launches import launched
 from sling2sim2real.exporting import usd
-from sling2sim2real.exporting.band import CalibratedBand
+from sling2sim2real.exporting.chain import Shot
 from sling2sim2real.exporting.match import (
     HOLD_LIMIT,
     LANDING_LIMIT,
@@ -41,7 +42,6 @@ from sling2sim2real.exporting.match import (
     proof_draws,
 )
 from sling2sim2real.exporting.mesh import Tube
-from sling2sim2real.exporting.replay import Shot
 from sling2sim2real.exporting.usd import EDGES, GRADING, UsdBand, UsdMatch, near_draws
 from sling2sim2real.simulator.launch import Launches
 
@@ -55,7 +55,7 @@ ONE_BY_ONE = np.concatenate([np.zeros((1, 4)), np.eye(4)[1:], -np.eye(4)[1:]])  
 SCENES = ONE_BY_ONE[:, None] + np.outer([-1, 0, 1], np.eye(4)[0])  # in each three moduli, (7, 3, 4)
 
 
-def matched(model: CalibratedBand, band: UsdBand) -> UsdMatch | None:
+def matched(model: Model, band: UsdBand) -> UsdMatch | None:
     """The band as PhysX wants it, and what that leaves; None where there is no PhysX or no GPU.
 
     Raises UserError where the Python that SLING_PHYSX names has none, or PhysX fails.
@@ -80,7 +80,7 @@ def matched(model: CalibratedBand, band: UsdBand) -> UsdMatch | None:
 
 
 def fitted(
-    engine: Engine, model: CalibratedBand, band: UsdBand, *, corrections: int = CORRECTIONS
+    engine: Engine, model: Model, band: UsdBand, *, corrections: int = CORRECTIONS
 ) -> tuple[UsdBand, list[Shot]]:
     """The band of which `near_draws` are held and land as in the calibrated simulation.
 
@@ -112,7 +112,7 @@ def fitted(
     return min(tried, key=lambda trial: trial[0])[1:]
 
 
-def changed(model: CalibratedBand, band: UsdBand, point: np.ndarray) -> UsdBand:
+def changed(model: Model, band: UsdBand, point: np.ndarray) -> UsdBand:
     """The band with modulus, mass, rest length times e to point[:3], clamps raised by the last."""
     young, mass, length = np.exp(point[:3])
     sling = replace(model.sling, rest_length=length * model.sling.rest_length)
@@ -150,7 +150,7 @@ def _least(constant: np.ndarray, slopes: np.ndarray) -> np.ndarray:
 
 
 def _errors(
-    engine: Engine, model: CalibratedBand, band: UsdBand, draws, ours: Launches, grid: np.ndarray
+    engine: Engine, model: Model, band: UsdBand, draws, ours: Launches, grid: np.ndarray
 ) -> np.ndarray:
     """Errors of forces and landings, at points (P, 4) of one mesh: (P, 2 N)."""
     count, same = len(draws), changed(model, band, grid[0])
@@ -191,16 +191,14 @@ def _clock(name: str) -> Callable[..., float]:
     return say
 
 
-def _launched_singly(
-    engine: Engine, model: CalibratedBand, band: UsdBand, draws: np.ndarray
-) -> list[Shot]:
+def _launched_singly(engine: Engine, model: Model, band: UsdBand, draws: np.ndarray) -> list[Shot]:
     """Shots of the written stage, each from draw (N, 2) of its own."""
     places = _places(model, draws, model.launches(draws))
     stage, theta = usd.text(band), _thetas(band, np.array([band.young]))
     return [_shots(engine, stage, model, band.tube, theta, place[None])[0] for place in places]
 
 
-def _shots(engine: Engine, stage: str, model: CalibratedBand, tube: Tube, thetas, places):
+def _shots(engine: Engine, stage: str, model: Model, tube: Tube, thetas, places):
     """Launches of a stage's bands, one by one."""
     done = launched(engine, stage, tube, thetas, model.sling, model.launch_setup, places)
     rows = zip(done.landing_y, done.speed, done.angle, done.hold_force, strict=True)
@@ -213,7 +211,7 @@ def _thetas(band: UsdBand, youngs: np.ndarray) -> np.ndarray:
     return np.column_stack([youngs, rest])
 
 
-def _places(model: CalibratedBand, draws: np.ndarray, ours: Launches) -> np.ndarray:
+def _places(model: Model, draws: np.ndarray, ours: Launches) -> np.ndarray:
     """Where the hand rests (N, 2): the arm gives way as much as in the calibrated simulation."""
     return yielded(draws, ours.hold_force, model.launch_setup.arm_stiffness)
 

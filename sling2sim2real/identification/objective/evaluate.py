@@ -14,7 +14,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from importlib.metadata import entry_points
 from itertools import count
 from pathlib import Path
 from typing import cast
@@ -22,7 +21,7 @@ from typing import cast
 import numpy as np
 
 from sling2sim2real.base.errors import UserError, one_line
-from sling2sim2real.base.imported import imported, is_import
+from sling2sim2real.base.imported import imported
 from sling2sim2real.base.machine import device, workers
 from sling2sim2real.base.progress import Progress
 from sling2sim2real.episode.episode import Episode
@@ -30,13 +29,11 @@ from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.loss import TERMS, EpisodeLoss
 from sling2sim2real.identification.results.theta import sling_of_method
 from sling2sim2real.settings import Settings
-from sling2sim2real.settings.identification import OUR_ENGINE
+from sling2sim2real.settings.identification import ENGINES, OUR_ENGINE
 from sling2sim2real.simulator.interaction import Rollouts, interact, with_recorded_pads
 from sling2sim2real.simulator.model import ClampedBand
 
 SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
-
-ENTRY_POINT_GROUP = "sling2sim2real.engines"  # of engines that installed packages offer
 
 Simulate = Callable[..., Rollouts]
 simulated: Simulate = partial(interact, fetch=False)  # the loss is computed where the rollouts are
@@ -173,26 +170,15 @@ def logging_evaluator(
 
 
 def simulate_of(engine: str) -> Simulate:
-    """The function of an engine: OUR_ENGINE, an installed package's, or `package.module:function`.
+    """The function of an engine: one of ENGINES, or `package.module:function`.
 
     Raises UserError where there is no such function.
     """
-    if engine == OUR_ENGINE:
-        return simulated
     try:
-        simulate = imported(engine if is_import(engine) else _installed(engine))
+        simulate = imported(ENGINES.get(engine, engine))
     except Exception as error:  # a module of the user's may raise anything
         message = one_line(f"{type(error).__name__}: {error}")
         raise UserError(f"engine {engine}: cannot be imported ({message})") from error
     if not callable(simulate):
         raise UserError(f"engine {engine}: must be a function; see docs/simulator.md")
     return cast(Simulate, simulate)
-
-
-def _installed(engine: str) -> str:
-    """Where an installed package has an engine, as `package.module:function`."""
-    for entry in entry_points(group=ENTRY_POINT_GROUP, name=engine):
-        return entry.value
-    raise LookupError(
-        f"no installed package has it among its {ENTRY_POINT_GROUP}; install this one anew"
-    )

@@ -179,8 +179,8 @@ def _score(centres: np.ndarray, spread: float) -> float:
     interval would leave out the densest where they end at a bound.
     """
     spread = np.hypot(spread, LEFT_SMOOTHING * centres.std())
-    ends = np.array([min(centres.min(), 0.0), max(centres.max(), 0.0)]) + [-6 * spread, 6 * spread]
-    places = np.append(np.linspace(*ends, LEFT_PLACES), 0.0)
+    low, high = min(centres.min(), 0.0) - 6 * spread, max(centres.max(), 0.0) + 6 * spread
+    places = np.append(np.linspace(low, high, LEFT_PLACES), 0.0)
     dense = np.exp(-0.5 * ((places[:, None] - centres) / spread) ** 2).mean(axis=1)
     dense, here = dense[:-1], dense[-1]
     less = dense[dense <= here].sum() / dense.sum()

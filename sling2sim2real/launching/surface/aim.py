@@ -19,8 +19,8 @@ def landings_within(landing_map: LandingMap, nodes: int) -> tuple[np.ndarray, np
         Shapes (nodes, nodes, 2) and (nodes, nodes); NaN where the draw fails.
     """
     axes = [
-        np.linspace(edges[0] + INSET, edges[-1] - INSET, nodes)
-        for edges in (landing_map.draw_y, landing_map.draw_z)
+        np.linspace(low + INSET, high - INSET, nodes)
+        for low, high in zip(landing_map.low, landing_map.high, strict=True)
     ]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     return grid, landing_map(grid.reshape(-1, 2)).landing_y.reshape(nodes, nodes)

@@ -1,71 +1,78 @@
-"""Landing map: launches over a grid of draws, simulated in one batch, for one θ.
+"""Landing map: launches over a grid of draws, simulated in one batch for one θ, and what is read
+between them.
 
 For a fixed θ the landing depends on the draw (y, z) alone, and smoothly. So a grid of launches is
-simulated once, and cubic splines read between them (response_surface.py): training then asks for a
-million launches in seconds, and the error of reading between is itself measured on random draws.
+simulated once, and cubic splines read between them: training then asks for a million launches in
+seconds. What the policy is worth that comes of it, simulated launches of its own say.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
-from typing import Protocol
+from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
+from scipy.interpolate import NdBSpline, RBFInterpolator, make_interp_spline
 
-from sling2sim2real.base.files import read_table, replacing
-from sling2sim2real.launching.surface.response_surface import NO_FAILURE, Landings, ResponseSurface
-
-
-class SimulatedLaunches(Protocol):
-    """N simulated launches."""
-
-    @property
-    def landing_y(self) -> np.ndarray:
-        """Landing on the floor [m], NaN where failed, shape (N,)."""
-        ...
-
-    @property
-    def hold_force(self) -> np.ndarray:
-        """Force that the hand holds before the release [N], shape (N,)."""
-        ...
-
-    @property
-    def failure(self) -> Sequence[str | None]:
-        """None, or the reason, length N."""
-        ...
-
-
-Launcher = Callable[..., SimulatedLaunches]  # of draws (N, 2) [m], without a force limit of its own
+TOO_MUCH_FORCE = "holding force above the limit"
+OUTSIDE = "draw outside the box"
+NO_FAILURE = ""
+# Of draws (N, 2) [m], without a force limit of its own; gives landings `landing_y` (N,) [m], NaN
+# where failed, `hold_force` (N,) [N] before the release, and `failure`, length N: None or why.
+Launcher = Callable[..., Any]
 
 
 @dataclass(frozen=True)
-class LandingMap:
-    """Launches over a grid of draws, and what is read between them.
+class Landings:
+    """What draws lead to, shapes (N,).
 
     Attributes:
-        draw_y: Grid along y [m], ascending, shape (Y,), at least 4.
-        draw_z: Grid along z [m], ascending, shape (Z,), at least 4.
-        landing_y: Simulated landings [m], NaN where failed, shape (Y, Z).
-        hold_force: Simulated holding force [N], NaN where the simulation failed, shape (Y, Z).
-        failure: Reason of each node, "" where none, shape (Y, Z).
-        max_force: The arm may hold no more [N].
-        checks: Random draws that were simulated to validate the map: columns draw_y, draw_z,
-            landing_y, hold_force [m, m, m, N], NaN where failed, shape (C, 4).
+        landing_y: Landing on the floor [m], NaN where failed.
+        hold_force: Force that the hand holds before the release [N].
+        failure: Index into `LandingMap.reasons`, 0 where the launch succeeds.
     """
 
-    draw_y: np.ndarray
-    draw_z: np.ndarray
     landing_y: np.ndarray
     hold_force: np.ndarray
     failure: np.ndarray
-    max_force: float
-    checks: np.ndarray
+
+
+class LandingMap:
+    """Landings of draws.
+
+    A draw is a failure, and not interpolated, where the interpolated holding force exceeds the
+    arm's limit or where a corner of its grid cell failed in simulation.
+
+    Attributes:
+        reasons: Names of the failure codes; code 0 is success.
+        low, high: Corners of the box of draws [m], shape (2,).
+    """
+
+    def __init__(
+        self,
+        grid: tuple[np.ndarray, np.ndarray],
+        landing_y: np.ndarray,
+        hold_force: np.ndarray,
+        failure: np.ndarray,
+        max_force: float,
+    ) -> None:
+        """Read between launches of a grid.
+
+        Args:
+            grid: Draws along y (Y,) and along z (Z,) [m], ascending.
+            landing_y: Landings [m], NaN where failed, shape (Y, Z).
+            hold_force: Of the drawn band [N], NaN where the simulation failed, shape (Y, Z).
+            failure: Reasons, NO_FAILURE where none, shape (Y, Z).
+            max_force: The arm may hold no more [N].
+        """
+        self.grid, self.max_force = grid, max_force
+        self.low, self.high = (np.array([axis[end] for axis in grid]) for end in (0, -1))
+        failures = sorted(set(failure.flat) - {NO_FAILURE})
+        self.reasons = [NO_FAILURE, TOO_MUCH_FORCE, OUTSIDE, *failures]
+        code = np.vectorize(self.reasons.index, otypes=[int])(failure)
+        self._cell = np.max([code[:-1, :-1], code[1:, :-1], code[:-1, 1:], code[1:, 1:]], axis=0)
+        self._landing, self._force = self._spline(landing_y), self._spline(hold_force)
 
     @classmethod
     def simulate(
@@ -76,106 +83,59 @@ class LandingMap:
         draw_z: tuple[float, float],
         size: tuple[int, int],
         max_force: float,
-        checks: int = 128,
-        seed: int = 0,
     ) -> LandingMap:
-        """A grid and random draws, all in one batch.
+        """Launch a grid.
 
         Args:
-            launcher: Simulates draws, shape (N, 2) [m], without a force limit of its own.
+            launcher: Simulates draws, shape (N, 2) [m].
             draw_y, draw_z: Bounds of the box [m].
-            size: Number of nodes along y and z.
-            max_force: Limit of the holding force [N].
-            checks: Number of random draws that validate the interpolation.
-            seed: Seed of those draws.
+            size: Number of nodes along y and z, at least 4.
+            max_force: The arm may hold no more [N].
         """
-        grid_y, grid_z = np.linspace(*draw_y, size[0]), np.linspace(*draw_z, size[1])
-        low, high = np.array([draw_y, draw_z]).T
-        random = np.random.default_rng(seed).uniform(low, high, (checks, 2))
-        nodes = np.stack(np.meshgrid(grid_y, grid_z, indexing="ij"), -1).reshape(-1, 2)  # y slowest
-        launched = launcher(np.concatenate([nodes, random]))
+        grid = np.linspace(*draw_y, size[0]), np.linspace(*draw_z, size[1])
+        launched = launcher(np.stack(np.meshgrid(*grid, indexing="ij"), -1).reshape(-1, 2))
         failure = np.array([reason or NO_FAILURE for reason in launched.failure], object)
         landing = np.where(failure == NO_FAILURE, launched.landing_y, np.nan)
         force = np.asarray(launched.hold_force, float)
-        count = len(nodes)
-        return cls(
-            draw_y=grid_y,
-            draw_z=grid_z,
-            landing_y=landing[:count].reshape(size),
-            hold_force=force[:count].reshape(size),
-            failure=failure[:count].reshape(size),
-            max_force=float(max_force),
-            checks=np.column_stack([random, landing[count:], force[count:]]),
-        )
+        landing, force, failure = (values.reshape(size) for values in (landing, force, failure))
+        return cls(grid, landing, force, failure, float(max_force))
 
     def __call__(self, draws: np.ndarray) -> Landings:
-        """Landings of draws, shape (N, 2) [m], read off the splines."""
-        return self.surface(draws)
+        """Landings of draws, shape (N, 2) [m]."""
+        draws = np.asarray(draws, float)
+        outside = ((draws < self.low - 1e-6) | (draws > self.high + 1e-6)).any(1)  # float32 draws
+        inside = np.clip(draws, self.low, self.high)
+        cell = [
+            np.clip(np.searchsorted(axis, along) - 1, 0, len(axis) - 2)
+            for axis, along in zip(self.grid, inside.T, strict=True)
+        ]
+        landing, force = self._landing(inside), self._force(inside)
+        failure = self._cell[*cell]
+        failure = np.where((failure == 0) & (force > self.max_force), 1, failure)
+        failure = np.where(outside, 2, failure)
+        return Landings(np.where(failure > 0, np.nan, landing), force, failure)
 
-    @cached_property
-    def surface(self) -> ResponseSurface:
-        """What is read between the launches."""
-        values = self.landing_y, self.hold_force, self.failure
-        return ResponseSurface((self.draw_y, self.draw_z), *values, self.max_force)
-
-    def save(self, path: Path, header: dict | None = None) -> None:
-        """Write one row a launch: grid nodes first (y slowest), then the validation draws."""
-        y, z = np.meshgrid(self.draw_y, self.draw_z, indexing="ij")
-        kind = ["grid"] * y.size + ["validation"] * len(self.checks)
-        failure = [reason or None for reason in self.failure.ravel()]
-        columns = {
-            "kind": pa.array(kind, pa.string()),
-            "draw_y": np.append(y, self.checks[:, 0]),
-            "draw_z": np.append(z, self.checks[:, 1]),
-            "landing_y": np.append(self.landing_y, self.checks[:, 2]),
-            "hold_force": np.append(self.hold_force, self.checks[:, 3]),
-            "failure": pa.array(failure + [None] * len(self.checks), pa.string()),
-        }
-        content = {"max_force": self.max_force, **(header or {})}
-        metadata = {"landing_map": json.dumps(content, sort_keys=True)}
-        with replacing(path) as temporary:
-            pq.write_table(pa.table(columns).replace_schema_metadata(metadata), temporary)
-
-    @classmethod
-    def load(cls, path: Path) -> LandingMap:
-        """Read a map that `save` wrote. Raises FileNotFoundError."""
-        table = read_table(path)
-        header = json.loads(table.schema.metadata[b"landing_map"])
-        kind = np.array(table["kind"].to_pylist())
-        column = {
-            name: table[name].to_numpy() for name in ("draw_y", "draw_z", "landing_y", "hold_force")
-        }
-        grid, check = kind == "grid", kind == "validation"
-        draw_y, draw_z = (np.unique(column[name][grid]) for name in ("draw_y", "draw_z"))
-        shape = (len(draw_y), len(draw_z))
-        failure = np.array(
-            [reason or NO_FAILURE for reason in table["failure"].to_pylist()], object
-        )
-        return cls(
-            draw_y=draw_y,
-            draw_z=draw_z,
-            landing_y=column["landing_y"][grid].reshape(shape),
-            hold_force=column["hold_force"][grid].reshape(shape),
-            failure=failure[grid].reshape(shape),
-            max_force=header["max_force"],
-            checks=np.column_stack([values[check] for values in column.values()]),
-        )
+    def _spline(self, values: np.ndarray) -> NdBSpline:
+        """Interpolating bicubic splines through values (Y, Z)."""
+        along_y = make_interp_spline(self.grid[0], _continued(values))
+        along_z = make_interp_spline(self.grid[1], np.moveaxis(along_y.c, 1, 0))
+        coefficients = np.ascontiguousarray(np.moveaxis(along_z.c, 0, 1))
+        return NdBSpline((along_y.t, along_z.t), coefficients, 3)
 
 
-def validation(landing_map: LandingMap, targets: tuple[float, float]) -> dict:
-    """Interpolation error [m] on a map's random draws: over the box, and where targets lie."""
-    simulated = landing_map.checks[:, 2]
-    error = np.abs(landing_map(landing_map.checks[:, :2]).landing_y - simulated)
-    finite = np.isfinite(error)
-    near = finite & (simulated >= targets[0]) & (simulated <= targets[1])
-
-    def summary(chosen: np.ndarray) -> dict:
-        if not chosen.any():
-            return {"draws": 0, "mean_error_m": None, "max_error_m": None}
-        return {
-            "draws": int(chosen.sum()),
-            "mean_error_m": float(error[chosen].mean()),
-            "max_error_m": float(error[chosen].max()),
-        }
-
-    return {"box": summary(finite), "target_range": summary(near)}
+def _continued(values: np.ndarray) -> np.ndarray:
+    """Failed nodes filled by a smooth continuation, so that they do not disturb their neighbours;
+    no answer is read from a cell that they touch.
+    """
+    finite = np.isfinite(values)
+    if not finite.any():
+        return np.zeros(values.shape)
+    if finite.all():
+        return values
+    nodes = np.stack(list(np.indices(values.shape)), -1).astype(float)
+    continuation = RBFInterpolator(
+        nodes[finite], values[finite], neighbors=min(24, int(finite.sum())), kernel="linear"
+    )
+    filled = values.copy()
+    filled[~finite] = continuation(nodes[~finite])
+    return filled

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from sling2sim2real.launching.surface.landing_map import Launcher
-from sling2sim2real.launching.surface.response_surface import (
+from sling2sim2real.launching.surface.landing_map import (
     NO_FAILURE,
     TOO_MUCH_FORCE,
+    LandingMap,
     Landings,
-    ResponseSurface,
+    Launcher,
 )
 from sling2sim2real.settings.lab import SetupParams
 from sling2sim2real.simulator.parameters import Parameters
 
 
 class SimulatedLandings:
-    """Landings in the place of a `ResponseSurface`: each draw is launched in the simulator.
+    """Landings in the place of a `LandingMap`: each draw is launched in the simulator.
 
     Attributes:
         reasons: Names of the failure codes, more with each new one; code 0 is success.
@@ -49,4 +49,4 @@ class SimulatedLandings:
         return self.reasons.index(name)
 
 
-Source = ResponseSurface | SimulatedLandings  # of landings
+Source = LandingMap | SimulatedLandings  # of landings

@@ -20,22 +20,6 @@ class Training(JsonRecord):
     max_error_m: float | None
 
 
-class MapError(JsonRecord):
-    """Error of reading between simulated launches, on so many random draws [m].
-
-    None where none lands.
-    """
-
-    draws: int
-    mean_error_m: float | None
-    max_error_m: float | None
-
-
-class LandingMapErrors(JsonRecord):
-    box: MapError
-    target_range: MapError
-
-
 class Projectile(JsonRecord):
     trained_at: Annotated[tuple[float, float], LIST]  # (y, z), m
 
@@ -44,7 +28,6 @@ class Card(JsonRecord):
     """The part of a policy's card (policy/export.py) that is read."""
 
     training: Training
-    landing_map: LandingMapErrors
     made_with: dict[str, Any] | None = None  # settings of params.yaml (settings/provenance.py)
     projectile: Projectile | None = None  # of a policy that sees it
 

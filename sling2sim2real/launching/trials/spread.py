@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from sling2sim2real.launching.surface.landing_map import Launcher, SimulatedLaunches
-from sling2sim2real.simulator.launch import landing_gradient
+from sling2sim2real.launching.surface.landing_map import Launcher
+from sling2sim2real.simulator.launch import Launches, landing_gradient
 from sling2sim2real.simulator.parameters import Parameters
 
 LEVEL = 0.9
@@ -100,6 +100,6 @@ def shortest(values: np.ndarray) -> np.ndarray:
     return values[[first, first + inside]]
 
 
-def _landing(launched: SimulatedLaunches) -> np.ndarray:
+def _landing(launched: Launches) -> np.ndarray:
     good = np.array([failure is None for failure in launched.failure])
     return np.where(good, np.asarray(launched.landing_y, float), np.nan)

@@ -7,14 +7,11 @@ the simulator's), "measured" (a user's CSV) or "predicted" (nothing but the cali
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
-from sling2sim2real.base.files import replacing
 from sling2sim2real.base.launches_file import CHECK, LaunchRow
 from sling2sim2real.base.pool import Pool
 from sling2sim2real.launching.surface.stored import Stored
@@ -29,8 +26,6 @@ SCHEMA = pa.schema(
         ("method", pa.string()),
         ("kind", pa.string()),  # virtual, measured or predicted
         ("target", pa.float64()),  # m; null where the launch had none
-        ("trial", pa.int64()),  # counts launches at a target; virtual ones of equal target and
-        # number are off by the same errors, whatever the method
         ("draw_y", pa.float64()),  # m, as commanded
         ("draw_z", pa.float64()),
         ("predicted_y", pa.float64()),  # m, by the calibrated simulator; null where it fails
@@ -53,162 +48,103 @@ SCHEMA = pa.schema(
 )
 
 
-@dataclass(frozen=True)
-class Batch:
-    """N launches of one kind and policy; a cell, or all, is None where there is nothing to tell.
-
-    Attributes:
-        draws: As commanded (y, z) [m], shape (N, 2).
-        targets: Aimed at [m].
-        landing: Where they landed [m], also where that counts as a failure.
-        failure: Why they count for nothing.
-        hold_force: Of the drawn band on the hand [N]; None: as predicted.
-        flight: Way of the projectile (y, z) [m], shape (K, 2) each.
-    """
-
-    kind: str
-    draws: np.ndarray
-    targets: list[float | None]
-    landing: list[float | None] | None = None
-    failure: list[str | None] | None = None
-    hold_force: list[float | None] | None = None
-    flight: list[np.ndarray | None] | None = None
-
-    def every(self, name: str) -> list:
-        """What an attribute tells of each launch."""
-        column_values = getattr(self, name)
-        return [None] * len(self.draws) if column_values is None else list(column_values)
+Trial = dict[str, Any]  # cells of a row by columns of SCHEMA; those that are not known are left out
 
 
-def scored(launches: Sequence[LaunchRow], method: str) -> list[Batch]:
-    """The launches to check a method's predictions with, if there are any."""
-    chosen = [
-        launch for launch in launches if launch.use == CHECK and launch.method in ("", method)
+def draws_of(trials: Sequence[Trial]) -> np.ndarray:
+    """As commanded (y, z) [m], shape (N, 2)."""
+    return np.array([(trial["draw_y"], trial["draw_z"]) for trial in trials], float)
+
+
+def scored(launches: Sequence[LaunchRow], method: str) -> list[Trial]:
+    """The launches to check a method's predictions with."""
+    return [
+        {
+            "kind": "measured",
+            "target": launch.target,
+            "draw_y": launch.draw[0],
+            "draw_z": launch.draw[1],
+            "landing_y": launch.landing,
+            "failure": "did not land" if launch.landing is None else None,
+        }
+        for launch in launches
+        if launch.use == CHECK and launch.method in ("", method)
     ]
-    if not chosen:
-        return []
-    landing = [launch.landing for launch in chosen]
-    failure = [None if y is not None else "did not land" for y in landing]
-    draws, targets = (
-        np.array([launch.draw for launch in chosen]),
-        [launch.target for launch in chosen],
-    )
-    return [Batch("measured", draws, targets, landing, failure)]
 
 
-def aimed(stored: Stored, targets: list[float]) -> Batch:
+def aimed(stored: Stored, targets: Sequence[float]) -> list[Trial]:
     """What the policy would launch at the targets [m]. Raises UserError."""
-    return Batch("predicted", stored.draws(np.array(targets)), list(targets))
+    draws = stored.draws(np.array(targets)).tolist()
+    return [
+        {"kind": "predicted", "target": target, "draw_y": y, "draw_z": z}
+        for target, (y, z) in zip(targets, draws, strict=True)
+    ]
 
 
-def launch_virtually(batch: Batch, launch: Callable) -> Batch:
-    """Launch a batch in a virtual world; launches of equal target and number have equal errors.
+def launch_virtually(trials: Sequence[Trial], launch: Callable) -> list[Trial]:
+    """Launch them in a virtual world; launches of equal target and number have equal errors.
 
-    Every method's batch has its targets in the same order, so a launch's place in it tells both.
+    Every method has its targets in the same order, so a launch's place among them tells both.
 
     Args:
         launch: `launch(draw, place)` gives landing_y [m], NaN where there is none, failure,
-            hold_force [N] and flight. It goes to processes of its own: it keeps one core busy.
+            hold_force [N] and flight (K, 2) [m]. It goes to processes of its own: it keeps one core
+            busy.
     """
     with Pool() as pool:
-        tried = list(pool.map(launch, batch.draws, range(len(batch.draws))))
-    landing = [trial.landing_y if np.isfinite(trial.landing_y) else None for trial in tried]
-    names = ("failure", "hold_force", "flight")
-    column_values = {name: [getattr(trial, name) for trial in tried] for name in names}
-    return replace(batch, kind="virtual", landing=landing, **column_values)
+        tried = list(pool.map(launch, draws_of(trials), range(len(trials))))
+    flights = ((None, None) if done.flight is None else done.flight.T for done in tried)
+    return [
+        trial
+        | {"kind": "virtual", "landing_y": done.landing_y, "failure": done.failure}
+        | {"hold_force": done.hold_force, "flight_y": y, "flight_z": z}
+        for trial, done, (y, z) in zip(trials, tried, flights, strict=True)
+    ]
 
 
-def predict(
-    batches: list[Batch],
+def predicted(
+    trials: Sequence[Trial],
     launcher: Callable[..., Launches],
     samples: Parameters | None,
     params: Settings,
-) -> tuple[Launches, np.ndarray]:
-    """What the calibrated simulator makes of the draws of all batches, N in all.
+) -> list[Trial]:
+    """Trials with what the calibrated simulator makes of their draws.
 
     Args:
         launcher, samples: As `landing_intervals` has them.
         params: The whole of params.yaml.
-
-    Returns:
-        Its launches, limited by the arm, and where 90 % of them would land [m], shape (N, 2); NaN
-        where that is not known.
     """
-    draws = np.concatenate([batch.draws for batch in batches])
+    draws = draws_of(trials)
     launches = limited(launcher(draws), params.setup.max_force)
     once, again = np.unique(draws, axis=0, return_inverse=True)
     error = params.trials.actuation_error
     intervals = landing_intervals(launcher, once, samples, error)[again]
     intervals[np.isnan(launches.landing_y)] = np.nan
-    return launches, intervals
+    columns = {
+        "predicted_y": launches.landing_y,
+        "predicted_low": intervals[:, 0],
+        "predicted_high": intervals[:, 1],
+        "predicted_failure": launches.failure,
+        "predicted_leave_y": launches.separation_y,
+        "predicted_leave_z": launches.separation_z,
+        "predicted_speed": launches.speed,
+        "predicted_angle": launches.angle,
+        "hold_force": launches.hold_force,
+    }
+    rows = (dict(zip(columns, cells, strict=True)) for cells in zip(*columns.values(), strict=True))
+    return [row | trial for row, trial in zip(rows, trials, strict=True)]
 
 
-def table(
-    band: str,
-    method: str,
-    batches: list[Batch],
-    *,
-    predicted: Launches,
-    intervals: np.ndarray,
-    stretch: np.ndarray,
-    recorded: float | None,
-) -> pa.Table:
-    """Trials as a table of `SCHEMA`, batch after batch; N launches in all.
+def table(trials: Sequence[Trial], stretch: np.ndarray, **common: str | float) -> pa.Table:
+    """Trials as a table of `SCHEMA`; what is NaN is not known.
 
     Args:
-        predicted: The calibrated simulator's launches of their draws.
-        intervals: Where 90 % of them would land [m], shape (N, 2); NaN where that is not known.
-        stretch: Of the drawn band, shape (N,).
-        recorded: Largest stretch of the recording.
+        stretch: Of each drawn band, shape (N,).
+        common: What all have alike: band, method, recorded_stretch.
     """
-
-    def every(name: str) -> list:
-        return [value for batch in batches for value in batch.every(name)]
-
-    def each(name: str) -> list:
-        return [getattr(batch, name) for batch in batches for _ in batch.draws]
-
-    def finite_or_none(values: np.ndarray | list) -> pa.Array:
-        return pa.array(values, pa.float64(), from_pandas=True)
-
-    force = zip(every("hold_force"), predicted.hold_force, strict=True)
-    columns = {
-        "band": [band] * len(stretch),
-        "method": [method] * len(stretch),
-        "kind": each("kind"),
-        "target": every("targets"),
-        "trial": [number for batch in batches for number in _counted(batch.targets)],
-        "draw_y": [y for y, _ in every("draws")],
-        "draw_z": [z for _, z in every("draws")],
-        "predicted_y": finite_or_none(predicted.landing_y),
-        "predicted_low": finite_or_none(intervals[:, 0]),
-        "predicted_high": finite_or_none(intervals[:, 1]),
-        "predicted_failure": predicted.failure,
-        "predicted_leave_y": finite_or_none(predicted.separation_y),
-        "predicted_leave_z": finite_or_none(predicted.separation_z),
-        "predicted_speed": finite_or_none(predicted.speed),
-        "predicted_angle": finite_or_none(predicted.angle),
-        "landing_y": every("landing"),
-        "flight_y": [None if way is None else way[:, 0] for way in every("flight")],
-        "flight_z": [None if way is None else way[:, 1] for way in every("flight")],
-        "hold_force": finite_or_none(
-            [
-                theirs if measured_force is None else measured_force
-                for measured_force, theirs in force
-            ]
-        ),
-        "failure": every("failure"),
-        "stretch": stretch,
-        "recorded_stretch": [recorded] * len(stretch),
-    }
-    return pa.table(columns, schema=SCHEMA)
-
-
-def _counted(targets: list[float | None]) -> list[int]:
-    """How many launches a target has had with each, from 1."""
-    return [targets[: i + 1].count(target) for i, target in enumerate(targets)]
-
-
-def save(trials: pa.Table, path: Path) -> None:
-    with replacing(path) as temporary:
-        pq.write_table(trials, temporary)
+    rows = []
+    for trial, each in zip(trials, stretch, strict=True):
+        cells = trial | {"stretch": each} | common
+        unknown = [name for name, cell in cells.items() if np.isscalar(cell) and cell != cell]
+        rows.append(cells | dict.fromkeys(unknown))
+    return pa.Table.from_pylist(rows, schema=SCHEMA)

@@ -94,7 +94,7 @@ def test_a_robot_that_pulls_twice_makes_two_recordings_in_one_file(recorded, tmp
     write_bag(path, Repeated(end=way.duration, draw=0.4, way=way, moments=moments))
     report = look_at(path, recorded[2], GivenBand.of({}, recorded[2].setup), pull=2).report
     pulls = report["pulls"]
-    assert plan.content()["pulls"] == len(pulls) == 2
+    assert plan.about["pulls"] == len(pulls) == 2
     assert all(pull["usable"] for pull in pulls), str(pulls)
     assert [pull["release_s"] for pull in pulls] == pytest.approx(releases, abs=1e-3)
     assert [pull["grasp_s"] for pull in pulls] == pytest.approx(grasps, abs=0.021)

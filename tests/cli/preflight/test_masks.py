@@ -68,7 +68,7 @@ def test_masks_alone_come_with_their_recording_and_better_ones_after_it(lab, mas
 
     def bring(recording: Path) -> dict[str, bytes]:
         folder = BandFolder.named("red")
-        file = BandFile({"mass": 0.0408, "diameter": 0.010, "rest_length": 0.52})
+        file = BandFile(mass=0.0408, diameter=0.010, rest_length=0.52)
         steps = fit.Steps(fit.COSTS)
         fit._bring_in(folder, file, folder.settings_with(file), [recording], steps)
         return masks(there / "masked.masks")

@@ -61,7 +61,7 @@ def engine(tmp_path, monkeypatch):
 def springs(monkeypatch):
     """Bands pull the pouch to the fork's middle with E [N/m]."""
 
-    def force_on(tube, sections, nodes, young, poisson, step):
+    def force_on(tube, sections, nodes, young, poisson):
         return -young[:, None] * nodes[:, sections[0]].mean(axis=1)
 
     monkeypatch.setattr(launches, "force_on", force_on)
@@ -137,14 +137,14 @@ def test_beside_a_band_with_mass_it_is_as_fast_as_within(
     chain, led = (Chain(np.linalg.norm(DRAWS[0])) for _ in range(2))
     seen = [np.diff(led.x)[-1]]
 
-    def force_on(tube, sections, nodes, young, poisson, step):
-        """As law.force_on: damped by what a whole step has changed."""
+    def force_on(tube, sections, nodes, young, poisson):
+        """Damped by what a whole step has changed: nothing before the first."""
         place = nodes[0, sections[0]].mean(axis=0)
         led.v[-1] = (np.linalg.norm(place) - led.x[-1]) * rate
-        if step is not None:
+        if len(seen) > 1:
             led.advance(1 / rate)
         seen.append(np.diff(led.x)[-1])
-        change = 0 if step is None else (seen[-1] - seen[-2]) * rate * led.DAMPING
+        change = (seen[-1] - seen[-2]) * rate * led.DAMPING
         pull = seen[-1] - led.LENGTH / led.COUNT + change
         return -led.STIFFNESS * led.COUNT * pull * place[None] / np.linalg.norm(place)
 

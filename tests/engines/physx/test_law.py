@@ -58,21 +58,6 @@ def energy_of(tube: Tube, nodes: np.ndarray) -> float:
     return np.linalg.det(before) / 6 @ [energy(gradient) for gradient in gradients]
 
 
-def test_damping_brakes_a_stretch_and_no_turn(sling):
-    grown = np.diag([1e-4, -3e-5, 2e-5])
-    brake = law.viscous(np.eye(3), np.eye(3) + grown, 3.0, YOUNG, POISSON)
-    mu = YOUNG / (2 * (1 + POISSON))
-    expected = 2 * mu * 3.0 * (grown + np.trace(grown) * np.eye(3))  # both constraints, 2 mu each
-    assert brake == pytest.approx(expected, rel=1e-3, abs=1e-3 * np.abs(expected).max())
-    stretched = np.diag([1.8, 0.8, 0.7])
-    turned = law.viscous(stretched, turn(7) @ stretched, 3.0, YOUNG, POISSON)
-    assert turned == pytest.approx(np.zeros((3, 3)), abs=1e-6 * YOUNG)
-    tube, delay = Tube.of(sling, edges=6, grading=1.0), np.array([0.0, 2.0, 4.0])
-    before, now = (np.tile(tube.rest * stretch, (3, 1, 1, 1)) for stretch in (1.3, 1.2))
-    elastic, *braked = law.force_on(tube, [0], now, YOUNG, POISSON, step=(before, delay))[:, 0]
-    assert braked[0] < elastic and braked[1] - elastic == pytest.approx(2 * (braked[0] - elastic))
-
-
 @pytest.mark.parametrize("poisson", [0.30, 0.45, 0.49])
 def test_a_straight_string_is_free_of_stress_across(sling, poisson):
     """The force of its tetrahedra, of two bands at once, is the closed form's."""

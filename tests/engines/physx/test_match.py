@@ -137,7 +137,6 @@ def test_an_export_is_matched_where_it_can_be(model, monkeypatch, tmp_path) -> N
     monkeypatch.setattr(match, "Engine", lambda: nullcontext(engine))
     monkeypatch.setattr(match, "release", lambda: "0.7")
     monkeypatch.setattr(match.wp, "is_cuda_available", lambda: True)
-    monkeypatch.setattr(usd, "match_of", lambda target: match.matched)
     done = export(model, "usd", tmp_path / "usd")
     card, text = done.card, (done.folder / "toy.usda").read_text()
     assert card["replayed"] and done.met is card["met"] and "0.7" in card["engine"]

@@ -1,8 +1,6 @@
 """Batches of parameters: slicing, workers, failures, engines, and what is said of them."""
 
-import tomllib
 from dataclasses import replace
-from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +14,10 @@ from sling2sim2real.identification.objective import evaluate
 from sling2sim2real.identification.objective.box import SearchBox
 from sling2sim2real.identification.objective.evaluate import Evaluator, simulate_of, simulated
 from sling2sim2real.identification.objective.loss import TERMS
-from sling2sim2real.settings.identification import ENGINES, OUR_ENGINE
 from sling2sim2real.simulator.parameters import THETA
 from tests.identification.objective import toy, toy_engine
 from tests.identification.searches.functions import Evaluate, rosenbrock
-from tests.project import DEFAULTS, ROOT
+from tests.project import DEFAULTS
 from validation.synthetic import recorded_yardstick
 
 PARAMS = load(DEFAULTS)
@@ -114,17 +111,9 @@ def test_ours_needs_no_import() -> None:
     assert simulate_of("sling") is simulated
 
 
-def test_an_installed_engine_is_found_by_its_name(monkeypatch) -> None:
-    """As pyproject.toml offers it; an installation from before that says what to do."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    offered = project["entry-points"][evaluate.ENTRY_POINT_GROUP]
-    points = EntryPoints(EntryPoint(*pair, evaluate.ENTRY_POINT_GROUP) for pair in offered.items())
-    monkeypatch.setattr(evaluate, "entry_points", points.select)
-    assert [*offered] == [name for name in ENGINES if name != OUR_ENGINE]
+def test_an_engine_of_ours_is_found_by_its_name() -> None:
+
     assert simulate_of("physx") is rollouts.simulate
-    monkeypatch.setattr(evaluate, "entry_points", EntryPoints().select)
-    with pytest.raises(UserError, match="engine physx: .* install this one anew"):
-        simulate_of("physx")
 
 
 @pytest.mark.parametrize(

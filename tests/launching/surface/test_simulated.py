@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from sling2sim2real.launching.surface.response_surface import TOO_MUCH_FORCE
+from sling2sim2real.launching.surface.landing_map import TOO_MUCH_FORCE
 from sling2sim2real.launching.surface.simulated import SimulatedLandings
 from tests.policy import toy
 

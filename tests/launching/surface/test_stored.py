@@ -18,7 +18,6 @@ TARGETS = np.array([1.5, 1.9])
 ERRORS = {"mean_error_m": 0.004, "max_error_m": None}
 CARD = {
     "training": {**ERRORS, "converged": True},
-    "landing_map": dict.fromkeys(("box", "target_range"), {**ERRORS, "draws": 9}),
 }
 
 

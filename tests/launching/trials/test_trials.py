@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from pipeline.params import load
-from sling2sim2real.launching.trials.trials import SCHEMA, Batch, launch_virtually, table
+from sling2sim2real.launching.trials import trials as module
+from sling2sim2real.launching.trials.trials import SCHEMA, launch_virtually, predicted, table
 from sling2sim2real.simulator.launch import Launches, launch, limited
 from sling2sim2real.simulator.model import ClampedBand, LaunchSetup
 from sling2sim2real.simulator.parameters import Parameters
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, with_
 
 PREDICTED = Launches(
     landing_y=np.array([1.9, np.nan, 2.0]),
@@ -24,36 +25,37 @@ PREDICTED = Launches(
 )
 
 
-def made(batches: list[Batch], predicted: Launches = PREDICTED) -> dict[str, list]:
-    whole = table(
-        "toy",
-        "ours",
-        batches,
-        predicted=predicted,
-        intervals=np.array([[1.8, 2.0], [np.nan, np.nan], [1.9, 2.1]]),
-        stretch=np.array([1.4, 1.4, 1.4]),
-        recorded=1.6,
-    )
+DRAWS = [[-0.3, -0.17], [-0.31, -0.17], [-0.32, -0.18]]
+
+
+def trials_of(*kinds: str) -> list[dict]:
+    places = zip(kinds, DRAWS, strict=False)
+    return [{"kind": kind, "target": 1.9, "draw_y": y, "draw_z": z} for kind, (y, z) in places]
+
+
+def made(trials: list[dict], monkeypatch) -> dict[str, list]:
+    intervals = np.array([[1.8, 2.0], [np.nan, np.nan], [1.9, 2.1]])[::-1]  # by the draw
+    monkeypatch.setattr(module, "landing_intervals", lambda *args: intervals)
+    with_limit = with_(load(DEFAULTS), "setup", max_force=40.0)
+    rows = predicted(trials, lambda draws: PREDICTED, None, with_limit)
+    whole = table(rows, [1.4, 1.4, 1.4], band="toy", method="ours", recorded_stretch=1.6)
     assert whole.schema.equals(SCHEMA)
     return whole.to_pydict()
 
 
-DRAWS = [[-0.3, -0.17], [-0.31, -0.17], [-0.32, -0.18]]
-
-
-def test_a_table_holds_what_is_known_and_nothing_else() -> None:
+def test_a_table_holds_what_is_known_and_nothing_else(monkeypatch) -> None:
     flight = np.array([[-0.05, -0.03], [1.0, 0.2], [1.95, -0.52]])
-    tried = Batch(
-        kind="virtual",
-        draws=np.array(DRAWS),
-        targets=[1.9, 1.9, 2.1],
-        landing=[1.95, None, None],
-        failure=[None, "too far", "too strong"],
-        hold_force=[9.1, 9.2, 31.5],
-        flight=[flight, flight[:2], None],
+    monkeypatch.setattr(module, "Pool", InProcess)
+    done = iter(
+        [
+            SimpleNamespace(landing_y=1.95, failure=None, hold_force=9.1, flight=flight),
+            SimpleNamespace(landing_y=np.nan, failure="far", hold_force=9.2, flight=flight[:2]),
+            SimpleNamespace(landing_y=np.nan, failure="strong", hold_force=31.5, flight=None),
+        ]
     )
-    rows = made([tried])
-    assert rows["trial"] == [1, 2, 1]
+    tried = launch_virtually(trials_of(*3 * ["predicted"]), lambda draw, place: next(done))
+    rows = made(tried, monkeypatch)
+    assert rows["kind"] == ["virtual"] * 3 and rows["band"] == ["toy"] * 3
     assert rows["draw_y"] == [-0.3, -0.31, -0.32] and rows["draw_z"] == [-0.17, -0.17, -0.18]
     assert rows["predicted_y"] == [1.9, None, 2.0]
     assert rows["predicted_low"] == [1.8, None, 1.9]
@@ -68,19 +70,26 @@ def test_a_table_holds_what_is_known_and_nothing_else() -> None:
     assert rows["flight_z"] == [[-0.03, 0.2, -0.52], [-0.03, 0.2], None]
 
 
-def test_batches_follow_each_other_and_count_anew() -> None:
-    """Launches of a policy and measured ones in one table, each with trials of its own."""
-    rows = made(
-        [
-            Batch("predicted", DRAWS[:1], [1.9]),
-            Batch("predicted", DRAWS[1:2], [1.9]),
-            Batch("measured", DRAWS[2:], [None], [2.2]),
-        ]
-    )
+def test_launches_of_a_policy_and_measured_ones_stand_in_one_table(monkeypatch) -> None:
+    trials = trials_of("predicted", "predicted", "measured")
+    trials[2] |= {"target": None, "landing_y": 2.2}
+    rows = made(trials, monkeypatch)
     assert rows["kind"] == ["predicted", "predicted", "measured"]
-    assert rows["trial"] == [1, 1, 1] and rows["target"] == [1.9, 1.9, None]
+    assert rows["target"] == [1.9, 1.9, None]
     assert rows["hold_force"] == [9.0, None, 31.0]  # as predicted
     assert rows["landing_y"] == [None, None, 2.2] and rows["flight_y"] == [None] * 3
+
+
+class InProcess:
+    """In the place of a pool: here, one after the other."""
+
+    map = staticmethod(map)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *args) -> None:
+        pass
 
 
 def test_the_limit_is_the_simulators_own() -> None:
@@ -116,10 +125,10 @@ def landed(draw: np.ndarray, number: int) -> SimpleNamespace:
 
 @pytest.mark.slow
 def test_landings_outside_the_area_stand_beside_their_failure() -> None:
-    draws = np.tile([-0.3, -0.1], (3, 1))
-    trial = launch_virtually(Batch("predicted", draws, [1.9, 1.9, 2.1]), landed)
-    assert (trial.kind, trial.targets) == ("virtual", [1.9, 1.9, 2.1])
-    assert trial.draws.tolist() == draws.tolist()
-    assert trial.landing == [1.9, 3.0, None]
-    assert trial.failure == [None, "failed", "failed"]
-    assert trial.hold_force == [300, 301, 302]
+    trials = trials_of(*3 * ["predicted"])
+    done = launch_virtually(trials, landed)
+    assert [(trial["kind"], trial["target"]) for trial in done] == [("virtual", 1.9)] * 3
+    assert [trial["landing_y"] for trial in done][:2] == [1.9, 3.0]
+    assert np.isnan(done[2]["landing_y"])
+    assert [trial["failure"] for trial in done] == [None, "failed", "failed"]
+    assert [trial["hold_force"] for trial in done] == pytest.approx([300, 311, 322])

@@ -1,4 +1,4 @@
-"""What the checks find in recordings and forces that are changed in one thing; in sound ones nothing."""
+"""What the checks find in what is changed in one thing, and in sound recordings nothing."""
 
 import ast
 import re

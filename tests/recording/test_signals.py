@@ -1,4 +1,4 @@
-"""Force and motion of formulas: a tool that is known or measured, a hand that turns, gaps, zeros."""
+"""Force and motion of formulas: a tool that is known or measured, a hand that turns, zeros."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from sling2sim2real.recording.events import Part
 from sling2sim2real.recording.force import flat_top, sensor_turns
 from sling2sim2real.recording.pace import Bursts
 from tests.project import with_
-from tests.recording.made import (
+from tests.recording.conftest import (
     abouts,
     of_pictures,
     of_signals,

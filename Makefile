@@ -9,9 +9,11 @@ setup: .venv/ready    # .venv with everything that is needed
 
 DEMO = data/raw/band1/dips/band1-dips.mcap
 
-demo: setup           # a virtual band: recorded with dips, then what README's `Your band` does with it
+demo: setup           # a virtual band: recorded with dips, fitted, launched once and fitted again
 	@test -f $(DEMO) || .venv/bin/python -m stages.record band1-dips
 	.venv/bin/sling fit $(DEMO) --mass 0.023 --diameter 0.0072 --rest-length 0.52 --name mine
+	@test -f bands/mine/launches.csv || .venv/bin/sling observe bands/mine --draw=-0.30,-0.15 \
+		--landing $$(.venv/bin/python -m tools.virtual_launch band1 -0.30 -0.15)
 	@echo "Next: source .venv/bin/activate, then sling aim bands/mine --target 1.925"
 
 .venv/ready: pyproject.toml constraints.txt tools/setup.sh

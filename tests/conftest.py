@@ -56,6 +56,22 @@ def params() -> Params:
     return load(DEFAULTS)
 
 
+@pytest.fixture(scope="session")
+def sling(params: Params):
+    """The first band of the rig, as params.yaml mounts it."""
+    from sling2sim2real.simulator.model import ClampedBand
+
+    return ClampedBand.of(params.bands["band1"], params.setup, params.sling)
+
+
+@pytest.fixture(scope="session")
+def bench(params: Params):
+    """Where checks of `sling verify` run."""
+    from validation.simulator.finding import Bench
+
+    return Bench(params)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files with slow tests come first, so that the processes which share them end together."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}

@@ -1,22 +1,15 @@
 """Presets in params.yaml, and where the report of such a run is kept."""
 
-import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
-import psutil
 import pytest
 from dvc.utils.hydra import apply_overrides
 from ruamel.yaml import YAML
 
 from pipeline.params import load
 from sling2sim2real.base.errors import UserError
-from tests.project import DEFAULTS, ROOT, until
-from tools.preset import PRESETS, preset, store_report, write_preset
+from tests.project import DEFAULTS
+from tools.preset import PRESETS, preset, write_preset
 
 
 def leaves(node: dict, *path: str) -> dict[tuple, object]:
@@ -78,37 +71,3 @@ def test_what_is_no_preset_or_spoils_params_is_refused_and_nothing_changes(tmp_p
         with pytest.raises(UserError, match=summary):
             write_preset(path, wrong)
         assert path.read_text(encoding="utf-8") == text
-
-
-def test_a_termination_ends_the_run_as_well() -> None:
-    code = "from tools.preset import status_of; exit(status_of(['sleep', '60']) != -15)"
-    process = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, start_new_session=True)
-    try:
-        until(lambda: psutil.Process(process.pid).children())
-        time.sleep(0.2)  # it listens
-        process.terminate()
-        assert process.wait(20) == 0
-    finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-
-
-def test_a_report_is_stored_in_a_folder_of_its_preset(tmp_path) -> None:
-    """What is copied is linked there, and all else where it was; the copy before is replaced."""
-    reports = tmp_path / "reports"
-    for part in ("figures", "tables"):
-        (reports / part).mkdir(parents=True)
-        (reports / part / "a").write_text(part)
-    links = "[a](figures/a) [b](bands/b/README.md) [c](../docs/c.md) [d](#d) [e](https://e.org)"
-    for file in ("README.md", "appendix.md"):
-        (reports / file).write_text(links + " [f](appendix.md#f)")
-    earlier = reports / "presets/large/old"
-    earlier.mkdir(parents=True)
-    folder = store_report(reports, "large", {"seconds": 3})
-    assert folder == reports / "presets/large" and not earlier.exists()
-    assert (folder / "README.md").read_text() == (
-        "[a](figures/a) [b](../../bands/b/README.md) [c](../../../docs/c.md) [d](#d)"
-        " [e](https://e.org) [f](appendix.md#f)"
-    )
-    assert (folder / "tables/a").read_text() == "tables"
-    assert json.loads((folder / "run.json").read_text()) == {"seconds": 3}

@@ -3,16 +3,14 @@
     python tools/preset.py large    # as `make large`; further arguments go to `sling flow`
 
 The preset's keys are written into params.yaml, for `git diff` to show and `git checkout` to take
-back (of reports and dvc.lock too, for its results); then `sling flow`. Its report is copied to
-reports/presets/, with run.json: where it ran, and how many seconds it took. Killed, it goes on
-where it was when it is called again, whose time is then that of the rest.
+back (of reports and dvc.lock too, for its results); then `sling flow`. In the end it says where it
+ran, and how many seconds it took. Killed, it goes on where it was when it is called again, whose
+time is then that of the rest.
 """
 
 from __future__ import annotations
 
 import json
-import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -28,14 +26,10 @@ sys.path.insert(0, str(ROOT))
 from pipeline.params import Params  # noqa: E402
 from sling2sim2real.base import errors  # noqa: E402
 from sling2sim2real.base.errors import UserError  # noqa: E402
-from sling2sim2real.base.files import replacing_folder, write_json, write_text  # noqa: E402
+from sling2sim2real.base.files import write_text  # noqa: E402
 from sling2sim2real.base.machine import commit, cores, processor  # noqa: E402
 
 PRESETS = ROOT / "presets"
-PAGES, PARTS = ("README.md", "appendix.md"), ("figures", "tables")
-ELSEWHERE = re.compile(
-    rf"(\]\()(?!https?:|#|(?:{'|'.join(map(re.escape, (*PAGES, *PARTS)))})(?=[/#)]))"
-)
 
 
 def preset(name: str) -> dict:
@@ -76,26 +70,6 @@ def status_of(run: list[str]) -> int:
     return process.wait()
 
 
-def store_report(reports: Path, name: str, about: dict) -> Path:
-    """Copy a run's report to reports/presets/<name>/; links to what is not copied still lead there.
-
-    `about` it is written beside, as run.json.
-
-    Returns the folder. The bands' cards stay where they are: a later run replaces them.
-    """
-    folder = reports / "presets" / name
-    folder.parent.mkdir(exist_ok=True)
-    with replacing_folder(folder) as temporary:
-        for page in PAGES:
-            text = (reports / page).read_text(encoding="utf-8")
-            write_text(temporary / page, ELSEWHERE.sub(r"\1../../", text))
-        for part in PARTS:
-            source = reports / part
-            shutil.copytree(source, temporary / part)
-        write_json(temporary / "run.json", about)
-    return folder
-
-
 def main() -> int:
     if len(sys.argv) < 2:
         raise UserError("usage: python tools/preset.py NAME [arguments of `sling flow`]")
@@ -109,9 +83,6 @@ def main() -> int:
         about = {"runs": " ".join(run), "preset": name, "seconds": seconds}
         about |= {"commit": commit(ROOT), "machine": f"{processor()}, {cores()} cores"}
         print(json.dumps(about, indent=2))
-        if not more:  # of all stages
-            folder = store_report(ROOT / "reports", name, about)
-            print(f"its report: {folder.relative_to(ROOT)}/README.md")
     return status
 
 

@@ -6,12 +6,12 @@ import copy
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import time
 import uuid
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
 
@@ -76,14 +76,6 @@ def copy_project(folder: Path) -> None:
         if (ROOT / name).is_file() and name != "dvc.lock":
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, folder / name, follow_symlinks=False)
-
-
-def set_params(folder: Path, values: Mapping[str, object]) -> None:
-    """Set values in params.yaml of a project, by keys with dots."""
-    yaml, path = YAML(), folder / "params.yaml"
-    content = yaml.load(path)
-    _set(content, values)
-    yaml.dump(content, path)
 
 
 def changed(params: Params, values: Mapping[str, object]) -> Params:
@@ -166,7 +158,6 @@ class ProjectCopy:
         options = {"cwd": self.folder, "env": self.environment, "capture_output": True}
         done = subprocess.run(command, text=True, timeout=self.limit, **options)
         assert done.returncode == 0, f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}"
-        self.errors = done.stderr
         return done.stdout
 
     def dvc(self, *arguments: str) -> set[str]:
@@ -175,7 +166,10 @@ class ProjectCopy:
 
     def set(self, values: Mapping[str, object]) -> None:
         """Set values in params.yaml, by keys with dots."""
-        set_params(self.folder, values)
+        yaml, path = YAML(), self.folder / "params.yaml"
+        content = yaml.load(path)
+        _set(content, values)
+        yaml.dump(content, path)
 
     def commit(self) -> None:
         """Commit all files, in a Git repository of the folder's own."""
@@ -190,9 +184,9 @@ class ProjectCopy:
 class MarkedRun:
     """Commands in a folder, whose processes all bear a mark in their environment."""
 
-    def __init__(self, folder: Path, log: Path | None = None, **more: str) -> None:
+    def __init__(self, folder: Path, **more: str) -> None:
         self.folder, self.mark = folder, uuid.uuid4().hex
-        self.log = log or folder.parent / "said.txt"
+        self.log = folder.parent / "said.txt"
         self.environment = environment(**{MARK: self.mark}, **more)
 
     def start(self, *command: str) -> subprocess.Popen:
@@ -207,54 +201,28 @@ class MarkedRun:
     def message(self) -> str:
         return self.log.read_text(errors="replace")
 
-    def alive(self) -> list[psutil.Process]:
-        return marked(MARK, self.mark)
+    def alive(self) -> dict[psutil.Process, str]:
+        """Command lines of what runs; zombies, which wait for a parent, apart."""
+        found = {}
+        for process in psutil.process_iter():
+            with suppress(psutil.NoSuchProcess, psutil.AccessDenied):
+                zombie = process.status() == psutil.STATUS_ZOMBIE
+                if not zombie and process.environ().get(MARK) == self.mark:
+                    found[process] = " ".join(process.cmdline())
+        return found
 
-    def named(self, word: str) -> list[psutil.Process]:
-        """Processes with `word` in their command line."""
-        return [process for process in self.alive() if word in command_line(process)]
+    def named(self, word: str) -> list[str]:
+        """Command lines with a word in them."""
+        return [line for line in self.alive().values() if word in line]
 
-    def left(self, seconds: float = PROMPT, apart: Collection[int] = ()) -> list[str]:
-        """Commands of what still lives after so long, but those by number; what does is killed."""
-
-        def alive() -> list[psutil.Process]:
-            return [process for process in self.alive() if process.pid not in apart]
-
-        wait(lambda: not alive(), seconds)
-        left = alive()
-        message = [line for process in left if (line := command_line(process))]
+    def left(self) -> list[str]:
+        """Command lines of what still lives after PROMPT; it is killed."""
+        wait(lambda: not self.alive(), PROMPT)
+        left = self.alive()
         for process in left:
-            send(process)
-        return message
-
-
-def marked(name: str, value: str) -> list[psutil.Process]:
-    """Processes with a variable in their environment; zombies, which wait for a parent, apart."""
-    processes = []
-    for process in psutil.process_iter():
-        try:
-            zombie = process.status() == psutil.STATUS_ZOMBIE
-            if not zombie and process.environ().get(name) == value:
-                processes.append(process)
-        except (psutil.NoSuchProcess, psutil.AccessDenied):
-            continue
-    return processes
-
-
-def command_line(process: psutil.Process) -> str:
-    """Empty if the process has just ended."""
-    try:
-        return " ".join(process.cmdline())
-    except psutil.NoSuchProcess:
-        return ""
-
-
-def send(process: psutil.Process, number: int = signal.SIGKILL) -> None:
-    """A signal to what may have ended by now."""
-    try:
-        process.send_signal(number)
-    except psutil.NoSuchProcess:
-        pass
+            with suppress(psutil.NoSuchProcess):
+                process.kill()
+        return [*left.values()]
 
 
 def wait(happens: Callable[[], Value], seconds: float) -> Value:

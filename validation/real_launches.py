@@ -12,13 +12,13 @@ and effective mass.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from scipy.optimize import least_squares
 
 from pipeline import params as settings
@@ -95,37 +95,27 @@ class Fit:
 
 def read(file: Path) -> list[Slingshot]:
     """Medians of the shots with each band and pellet."""
-    with file.open(encoding="utf-8") as lines:
-        shots = list(csv.DictReader(lines))
-    return [
-        slingshot(name, [shot for shot in shots if shot["band_type"] == name])
-        for name in sorted({shot["band_type"] for shot in shots})
-    ]
+    shots = pd.read_csv(file)
+    return [slingshot(str(name), of) for name, of in shots.groupby("band_type")]
 
 
-def slingshot(name: str, shots: list[dict[str, str]]) -> Slingshot:
+def slingshot(name: str, shots: pd.DataFrame) -> Slingshot:
     """Medians of the shots with one band."""
-
-    def median(column: str, of: list[dict[str, str]] = shots) -> float:
-        return float(np.median([float(shot[column]) for shot in of]))
-
-    pellets = [
-        [shot for shot in shots if shot["pellet_type"] == pellet]
-        for pellet in {shot["pellet_type"] for shot in shots}
-    ]
-    pellets.sort(key=lambda of: median("calc_mass_g", of))
-    speed = np.array([median("velocity_mps", of) for of in pellets])
-    deviation = [np.std([float(shot["velocity_mps"]) for shot in of], ddof=1) for of in pellets]
+    pellets = shots.groupby("pellet_type")
+    each = pellets[["calc_mass_g", "velocity_mps"]].median()
+    each["scatter"] = pellets.velocity_mps.std() / each.velocity_mps
+    each = each.sort_values("calc_mass_g")
+    whole = shots[["draw_length_m", "slack_length_m", "draw_weight_kg"]].median()
     thickness, narrowest, widest = SIZES[name]
     section = 1e-6 * thickness * (narrowest + widest) / 2
     return Slingshot(
         name=name,
-        draw=median("draw_length_m"),
-        slack=median("slack_length_m"),
-        weight=GRAVITY * median("draw_weight_kg"),
-        mass=1e-3 * np.array([median("calc_mass_g", of) for of in pellets]),
-        speed=speed,
-        scatter=np.array(deviation) / speed,
+        draw=whole.draw_length_m,
+        slack=whole.slack_length_m,
+        weight=GRAVITY * whole.draw_weight_kg,
+        mass=1e-3 * each.calc_mass_g.to_numpy(),
+        speed=each.velocity_mps.to_numpy(),
+        scatter=each.scatter.to_numpy(),
         sized_mass=2 * section * LENGTH * LATEX,
         section=section,
     )

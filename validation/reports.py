@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import platform
 import sys
 from collections.abc import Mapping
+from importlib.metadata import version
 from pathlib import Path
 from textwrap import wrap
 
@@ -11,9 +14,28 @@ import numpy as np
 
 from pipeline.layout import ROOT
 from sling2sim2real.base.files import write_json
-from validation.environment import environment
+from sling2sim2real.base.machine import commit, named, processor
 
 LINE = 125  # characters of a page
+
+
+def environment(device: str, command: str = "") -> dict:
+    """What a figure belongs to: device, its name, cores, command, commit and versions."""
+    import warp as wp
+
+    device, name = named(device, "--device"), processor()
+    if device != "cpu":
+        name = wp.get_device(device).name
+    packages = ("warp-lang", "numpy", "scipy")
+    return {
+        "device": device,
+        "device_name": name,
+        "cores": os.cpu_count(),
+        "command": command or f"sling bench --device {device} --json",
+        "commit": commit(ROOT),
+        "versions": {"python": platform.python_version()}
+        | {package: version(package) for package in packages},
+    }
 
 
 def write_report(

@@ -43,16 +43,37 @@ def view(folder: BandFolder, save: Path | None = None) -> str:
     stream = rerun.RecordingStream("sling view", recording_id=folder.digest[:32])
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
+    layout = _layout()
     if save is None:
-        stream.spawn()
+        stream.spawn(default_blueprint=layout)
         _log(stream, folder, found, episode, simulated)
         return f"{folder.path}: shown in Rerun's viewer"
     with replacing(save) as temporary:
-        stream.save(temporary)
+        stream.save(temporary, default_blueprint=layout)
         _log(stream, folder, found, episode, simulated)
         stream.flush()
         stream.disconnect()
     return f"{save}: open it with `rerun {save}`"
+
+
+def _layout() -> Any:
+    """Space and picture, one plot for each component of the force, the card."""
+    from rerun import blueprint
+
+    forces = (
+        blueprint.TimeSeriesView(origin=f"force_{axis}", name=f"force {axis} [N]") for axis in "yzx"
+    )
+    return blueprint.Blueprint(
+        blueprint.Horizontal(
+            blueprint.Vertical(
+                blueprint.Spatial3DView(origin="fork", name="frame O"),
+                blueprint.Spatial2DView(origin="fork/camera", name="camera"),
+            ),
+            blueprint.Vertical(*forces),
+            blueprint.TextDocumentView(origin="card", name="card"),
+        ),
+        collapse_panels=True,
+    )
 
 
 def _log(
@@ -92,7 +113,11 @@ def _log(
     _camera(folder, episode, simulated, still, at)
     _launches(folder, found, floor, still)
     if (card := folder.card / "README.md").is_file():
-        still("card", rerun.TextDocument(card.read_text("utf-8"), media_type="text/markdown"))
+        lines = card.read_text("utf-8").splitlines(keepends=True)
+        text = "".join(
+            line for line in lines if not line.startswith("![")
+        )  # pictures lie elsewhere
+        still("card", rerun.TextDocument(text, media_type="text/markdown"))
 
 
 def _camera(folder: BandFolder, episode: Episode, simulated: Simulated, still, at) -> None:

@@ -75,7 +75,6 @@ def changed(folder, tmp_path, name: str, content: bytes | None):
     ("name", "content", "expected"),
     [
         ("pose.csv", None, "pose.csv: cannot be read"),
-        ("pose.csv", b"", "pose.csv: cannot be read"),
         (
             "pose.csv",
             b"time,x,y\n0,0,0\n",
@@ -88,25 +87,16 @@ def changed(folder, tmp_path, name: str, content: bytes | None):
         ),
         (
             "force.csv",
-            b"time,fx,fy,fz\n1,0,n/a,0\n\n",
-            "force.csv, line 2: fy is no number: 'n/a'",
-        ),
-        (
-            "force.csv",
             b"time,fx,fy,fz\n1,0,0,0\n1,0,0,0\n",
             "force.csv, line 3: time does not incr",
         ),
-        ("force.csv", b"time,fx,fy,fz\n1,0,0,0\n", "force_time: must be at least ten increasing"),
         ("episode.yaml", b"camera: [1, 2, 3]\ngrasp: 1", "episode.yaml: grasp: unknown key"),
-        ("episode.yaml", None, "episode.yaml: no such file"),
         ("clouds/first.npy", b"", "first.npy: its name must be a stamp"),
-        ("clouds/10.000.npy", b"", r"10.000.npy: cannot be read"),
         (
             "clouds/10.100.ply",
             b"ply\nelement vertex 7\nend_header\n",
             r"10.100.ply: must hold finite",
         ),
-        ("clouds/10.100.ply", b"solid", "10.100.ply: is no PLY file with vertices"),
     ],
 )
 def test_what_is_wrong_is_one_line(folder, tmp_path, name, content, expected) -> None:

@@ -15,11 +15,6 @@ def test_changes_reach_any_depth_and_nothing_else() -> None:
     assert back == old
 
 
-def test_coarse_settings_take_changes_too() -> None:
-    settings = Settings.coarse(sling={"edges": 8})
-    assert (settings.sling.edges, settings.sling.grip_step) == (8, 0.01)
-
-
 def test_a_file_of_ones_own(tmp_path) -> None:
     text = DEFAULTS.read_text().replace("fork_width: 0.275", "fork_width: 0.25")
     (tmp_path / "mine.yaml").write_text(text)

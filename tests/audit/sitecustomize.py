@@ -1,23 +1,17 @@
 """Notes what a stage reads of params.yaml; Python runs this first where it lies on PYTHONPATH.
 
 tests/test_pipeline.py compares the notes, `$AUDIT/<stage>.<process>.json`, with the `params:` of
-dvc.yaml. What takes long and no parameter sets is made short: `SHORT`.
+dvc.yaml.
 """
 
 import atexit
 import gc
-import importlib
 import json
 import os
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-SHORT = {  # by stage and module
-    "report": {
-        "sling2sim2real.drawing.styles": {"THEME": {}}
-    },  # a layout that is solved draws all twice
-}
 read: set[str] = set()
 gc.set_threshold(100_000, 50, 50)  # it is looked for garbage while torch is imported
 
@@ -82,14 +76,6 @@ def note(path: str) -> None:
         )
 
 
-def shorten(step: str) -> None:
-    """In this process, which is a stage's own."""
-    for name, constants in SHORT.get(step, {}).items():
-        module = importlib.import_module(name)
-        assert constants.keys() <= vars(module).keys(), name
-        vars(module).update(constants)
-
-
 def install(stage: str) -> None:
     os.environ["AUDITED"] = stage
     sys.path.insert(0, os.getcwd())
@@ -105,6 +91,5 @@ if sys.orig_argv[1:2] == ["-m"] and sys.orig_argv[2].startswith("stages."):
     module, *item = sys.orig_argv[2:]
     step = module.removeprefix("stages.")
     install("@".join(filter(None, (step, "-".join(item)))))
-    shorten(step)
 elif "AUDITED" in os.environ:  # a process that a stage started
     install(os.environ["AUDITED"])

@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -12,9 +11,7 @@ from pipeline.layout import Layout
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import NotMade
 from sling2sim2real.card.camera import Pictures
-from sling2sim2real.card.camera_view import CameraView
-from sling2sim2real.card.simulated import Simulated, simulate
-from sling2sim2real.recording.camera import Camera
+from sling2sim2real.card.simulated import simulate
 from sling2sim2real.recording.frames import EpisodeGeometry, geometry_of
 from sling2sim2real.recording.streams import read_recording
 from sling2sim2real.recording.transforms import Transform
@@ -46,35 +43,6 @@ def test_the_recorded_band_is_seen_where_it_is_projected(pictures, summary) -> N
         places = pictures.project(line)
         assert band_coloured(pictures[number], places) > 0.97
         assert band_coloured(pictures[number], places + [0, 4]) < 0.1
-
-
-def test_a_cut_shows_the_same_larger(pictures, summary) -> None:
-    line = TRUTH.center_line(2.9)
-    simulated = Simulated(
-        TRUTH.release, 0.0, np.array([0.0, 4.0]), np.array([line, line]), np.arange(180.0),
-        np.zeros((120, 3)),
-    )  # fmt: skip
-    view = CameraView.of(pictures, simulated, (480, 440))
-    number = pictures.latest(2.9)
-    image = view.picture(number)
-    assert image.shape == (440, 480, 3) and view.scale > 1.2
-    far = line[(np.linalg.norm(line - TRUTH.hand(2.9), axis=1) > 0.08) & (line[:, 1] < -0.02)]
-    assert band_coloured(image, view.places(far)) > 0.97
-    assert band_coloured(image, view.places(far) + [0, 9]) < 0.1
-
-
-def test_a_lens_and_a_pose_are_those_of_opencv() -> None:
-    matrix = np.array([[500.0, 0, 320], [0, 510, 240], [0, 0, 1]])
-    lens = np.array([-0.25, 0.08, 1e-3, -2e-3, 0.01])
-    turn, place = Rotation.from_rotvec([0.3, -0.5, 0.2]), np.array([0.1, -0.2, 1.5])
-    pictures = Pictures(
-        np.arange(3.0), Camera(640, 480, matrix, lens, ""), Transform(turn, place), []
-    )
-    points = np.random.default_rng(1).uniform(-0.4, 0.4, (50, 3))
-    expected, _ = cv2.projectPoints(points, turn.as_rotvec(), place, matrix, lens)
-    np.testing.assert_allclose(pictures.project(points), expected[:, 0], atol=1e-6)
-    behind = turn.inv().apply([[0.0, 0.0, -1.0]] - place)
-    assert np.isnan(pictures.project(behind)).all()
 
 
 def test_the_parts_of_a_split_bag_are_one_recording(pictures, summary, project, tmp_path) -> None:

@@ -69,13 +69,3 @@ def test_what_speaks_against_any_use_is_mended_first() -> None:
     reasons = [Reason(True, "why", "Do this."), Reason(False, "too", "And that.")]
     requested = reasons, model, np.array([1.7, 1.9]), [still(0.0)]
     assert next_steps(*requested) == ["Do this.", "And that."]
-
-
-def test_where_nothing_helps_it_says_so() -> None:
-    model = LandingModel(NAMES, 1e-12 * np.eye(4), GRADIENT, np.zeros(2), np.ones(2))
-    exact = LandingModel(NAMES, 1e-12 * np.eye(4), GRADIENT, np.full(2, 1e-9), np.ones(2))
-    assert next_steps([], None, np.array([1.7]), [still(0.0)]) == [
-        "No further measurement would narrow the landings by much: launch."
-    ]
-    assert model.after(draw=0.0)[0] == pytest.approx(1.0)
-    assert len(next_steps([], exact, np.array([1.7, 1.9]), [still(0.0)])) >= 1

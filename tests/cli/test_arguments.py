@@ -39,14 +39,10 @@ def test_what_is_no_quantity_of_any_unit(text: str) -> None:
 
 def test_draw_is_two_numbers_behind_the_fork() -> None:
     for text, words in (
-        ("", "must be Y,Z"),
         ("-0.3", "must be Y,Z"),
-        ("-0.3,", "must be a number"),
         ("-0.3,a", "must be a number"),
         ("-0.3,-0.1,0", "must be Y,Z"),
         ("0.3,-0.1", "y must be below 0"),
-        ("nan,0", "must be a number"),
-        ("-inf,0", "must be a number"),
         ("-0.01,0", "from 0.05 to 2, got 0.01"),
     ):
         assert words in refusal(draw, text)

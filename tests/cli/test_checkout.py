@@ -9,36 +9,25 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.cli import checkout
 
 
-class Replaced(Exception):
-    """The process would be another one now."""
+def test_each_runs_its_module_in_the_projects_folder_and_elsewhere_is_refused(
+    tmp_path, monkeypatch
+) -> None:
+    """From any folder below; the process becomes another one, which `execv` never leaves."""
+    started = []
 
-
-@pytest.fixture
-def started(monkeypatch: pytest.MonkeyPatch) -> list:
-    given = []
-
-    def execv(program: str, arguments: list[str]) -> None:
-        given.extend([os.getcwd(), program, arguments])
-        raise Replaced
+    def execv(*given) -> None:
+        started.append((os.getcwd(), *given))
+        raise SystemExit
 
     monkeypatch.setattr(os, "execv", execv)
-    return given
-
-
-@pytest.mark.parametrize("command", checkout.COMMANDS)
-def test_it_runs_the_module_in_the_projects_folder(command, started, tmp_path, monkeypatch) -> None:
-    inner = tmp_path / "reports" / "bands"
+    inner = tmp_path / "project/reports/bands"
     inner.mkdir(parents=True)
-    (tmp_path / "dvc.yaml").touch()
-    monkeypatch.chdir(inner)
-    with pytest.raises(Replaced):
-        checkout.run(command, ["--workers", "2"])
-    module = checkout.COMMANDS[command][0]
-    assert started == [
-        str(tmp_path), sys.executable, [sys.executable, "-m", module, "--workers", "2"]
-    ]  # fmt: skip
-
-
-def test_elsewhere_it_is_refused(tmp_path) -> None:
+    (tmp_path / "project/dvc.yaml").touch()
+    for command, (module, *_) in checkout.COMMANDS.items():
+        monkeypatch.chdir(inner)
+        with pytest.raises(SystemExit):
+            checkout.run(command, ["--workers", "2"])
+        arguments = [sys.executable, "-m", module, "--workers", "2"]
+        assert started.pop() == (str(tmp_path / "project"), sys.executable, arguments)
     with pytest.raises(UserError, match="sling flow: needs a checkout of the project: no dvc.yaml"):
         checkout.run("flow", [], tmp_path)

@@ -86,8 +86,6 @@ def test_a_tool_and_topics_are_taken_down(path) -> None:
     setup = lab_settings(path).setup
     assert (setup.tool.mass, setup.tool.center) == (0.7, (0.0, 0.0, 0.05))
     assert (setup.topics.wrench, setup.topics.pose) == ("/ft", "/ee")
-    with pytest.raises(UserError, match="setup.tool.mass: must be between 0 and 20, got 700"):
-        set_up(dict(tool=(700, 0.0, 0.0, 0.05)), path)
 
 
 def test_two_of_three_poses_give_the_fork_in_the_base(path) -> None:
@@ -111,6 +109,8 @@ def test_two_of_three_poses_give_the_fork_in_the_base(path) -> None:
     [
         ({}, "nothing to set up: give what you measured"),
         ({"left_tip": LEFT}, "the fork needs both tips"),
+        ({"left_tip": LEFT, "right_tip": LEFT}, "are the same place"),
+        ({"floor": 0.0}, "--floor: is in the robot's base, in which the fork is not known"),
         (
             {"left_tip": LEFT, "right_tip": (0.7, -0.15, 0.42)},
             "0.2875 m apart, setup.fork_width is",
@@ -120,10 +120,8 @@ def test_two_of_three_poses_give_the_fork_in_the_base(path) -> None:
             "0.2750 m apart, --fork-width is 0.3000 m: 25.0 mm differ, and touching explains 4.2",
         ),
         ({"left_tip": LEFT, "right_tip": (0.7, -0.1365, 0.452)}, "right tip is 32 mm higher than"),
-        ({"left_tip": LEFT, "right_tip": LEFT}, "are the same place"),
         ({"left_tip": RIGHT, "right_tip": LEFT}, "the target would lie behind the robot"),
         ({"base_to_camera": LOOKING_DOWN}, "setup.base_to_fork is null, so the camera"),
-        ({"floor": 0.0}, "--floor: is in the robot's base, in which the fork is not known"),
         (
             {"left_tip": LEFT, "right_tip": RIGHT, "floor": 0.5},
             "the floor would lie above the fork",
@@ -142,7 +140,6 @@ def test_two_of_three_poses_give_the_fork_in_the_base(path) -> None:
             "the camera would stand 0.46 m below the floor",
         ),
         ({"draw_z": (-0.6, -0.1)}, "setup.draw_z: must be above the floor"),
-        ({"draw_y": (-0.2, -0.4)}, "setup.draw_y: the first must be less than the second"),
     ],
 )
 def test_what_contradicts_is_one_line_and_nothing_is_written(path, measured, words) -> None:
@@ -162,10 +159,8 @@ def test_the_command_line(path, sling) -> None:
     assert changed["topics"] == {"old": {}, "new": {"wrench": "/ft"}}
     assert YAML(typ="safe").load(path.read_text())["setup"]["max_force"] == 20.0
     for arguments, words in (
-        ((), "nothing to set up"),
         (("--left-tip", "-0.7,0.1,0.4"), "one that begins with - is joined by =: --left-tip=-..."),
         (("--topic", "force=/ft"), "must be ROLE=TOPIC, of wrench, pose"),
-        (("--floor=-520",), "must be in metres, from -10 to 10, got -520, which looks like milli"),
         (("--base-to-camera=1,2,3,0,0,0,2",), "its quaternion must have length 1, not 2"),
     ):
         done = sling("setup", *arguments, folder=lab)

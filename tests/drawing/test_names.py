@@ -51,9 +51,3 @@ def test_a_name_is_shown_letter_by_letter(name: str, tmp_path: Path) -> None:
         *("table", "thead", "tbody", "tr", "th", "td"),
     }
     assert body.count("<td>") == 2
-
-
-def test_markup_that_is_not_code_would_be_obeyed(tmp_path: Path) -> None:
-    """So the test above can fail; HTML in a text never counts."""
-    html = page("## **a** <script>alert(1)</script>", tmp_path, "A title")
-    assert "<strong>a</strong>" in html and "<script" not in html

@@ -14,7 +14,6 @@ from sling2sim2real.episode.signal import (
     cutoff_hz,
     lowpass,
     recording_matrix,
-    uniform,
 )
 
 
@@ -50,22 +49,6 @@ def test_average_is_the_integral_of_the_line_through_irregular_samples() -> None
     means = average(t, np.stack([3 * t - 1, 0 * t + 7], 1), 0.1, 0.05, 20)
     middles = 0.1 + 0.05 * (np.arange(20) + 0.5)
     np.testing.assert_allclose(means, np.stack([3 * middles - 1, np.full(20, 7)], 1), atol=1e-12)
-
-
-def test_average_does_not_depend_on_the_steps() -> None:
-    """A simulation with tiny steps after the release must not weigh that part more."""
-    coarse = np.linspace(0, 1, 11)
-    x = np.sin(5 * coarse)
-    fine = np.union1d(coarse, np.linspace(0.31, 0.39, 500))
-    np.testing.assert_allclose(
-        average(fine, np.interp(fine, coarse, x), 0, 0.2, 5), average(coarse, x, 0, 0.2, 5)
-    )
-
-
-def test_uniform_grid_covers_the_samples() -> None:
-    grid, x = uniform(np.array([0.0, 0.3, 1.0]), np.array([0.0, 3.0, 10.0]), 10)
-    np.testing.assert_allclose(grid, np.arange(11) / 10)
-    np.testing.assert_allclose(x, np.arange(11.0))
 
 
 @pytest.mark.parametrize("cutoff", [0.5, 5.0, 35.65, 600.0])

@@ -1,22 +1,16 @@
-"""The Franka's scripts: on a fake that records the commands; on a simulated arm where there is one.
-
-Neither is a robot.
-"""
+"""The Franka's script on a fake that records the commands: it is no robot."""
 
 from __future__ import annotations
 
 import importlib.util
 import json
-import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
-from rosbags.typesys import Stores, get_typestore
 
 from pipeline.params import load
 from sling2sim2real import Band
@@ -184,43 +178,3 @@ def test_it_stops_where_the_fingers_or_a_joint_fail(execute, planned, monkeypatc
         assert run(execute, monkeypatch, fake, planned[0]) == 1
         assert words in capsys.readouterr().err
         assert not [call for call in fake.summary if call[0] == "open"][1:]
-
-
-def test_the_launch_file_records_what_the_docs_say(monkeypatch) -> None:
-    """By a stand-in for ROS's package; types as rosbags has them."""
-    fake = {
-        "launch": SimpleNamespace(LaunchDescription=lambda actions: actions),
-        "launch.actions": SimpleNamespace(
-            DeclareLaunchArgument=lambda name, default_value: (name, default_value),
-            ExecuteProcess=lambda cmd, output: cmd,
-        ),
-        "launch.substitutions": SimpleNamespace(LaunchConfiguration=lambda name: f"${name}"),
-    }
-    for name, stand_in in fake.items():
-        monkeypatch.setitem(sys.modules, name, stand_in)
-    file = module("franka_record", FOLDER / "record.launch.py")
-    *given, command = file.generate_launch_description()
-    defaults = {f"${name}": value for name, value in given}
-    line = " ".join(defaults.get(word, word) for word in command)
-    page = " ".join((ROOT / "docs/recording.md").read_text().replace("\\\n", " ").split())
-    assert line in page
-    message_types = get_typestore(Stores.ROS2_HUMBLE).types
-    assert set(file.TOPICS.values()) <= set(message_types)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif("SLING_FRANKY" not in os.environ, reason="SLING_FRANKY: a Python with franky")
-def test_a_simulated_franka_ends_each_phase_where_the_plan_does(planned, tmp_path) -> None:
-    """By MuJoCo's joints. There is no band, and it is no robot."""
-    folder, plan = planned
-    command = [os.environ["SLING_FRANKY"], str(FOLDER / "simulated.py"), str(folder)]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=400)
-    assert done.returncode == 0, done.stderr
-    track = np.array(json.loads(done.stdout.splitlines()[-1])["track"])
-    rows = {row["phase"]: row for row in plan.about["phases"]}
-    for name, near in (("approach", 0.001), ("lift", 0.004), ("pull", 0.001)):
-        off = np.linalg.norm(track[:, 1:4] - rows[name]["base"], axis=1)
-        assert off.min() < near, name
-    drawn = np.linalg.norm(track[:, 1:4] - rows["pull"]["base"], axis=1) < 0.001
-    widths = track[drawn, 4]
-    assert widths[0] < 0.005 and track[-1, 4] > 0.078

@@ -72,14 +72,3 @@ def test_a_stiffer_band_needs_shorter_steps(chain) -> None:
     assert replace(chain, damping_time=5e-3).stable_step < steps[0]
     with pytest.raises(UserError, match="time steps below"):
         _ = replace(chain, strength=1e9).stable_step
-
-
-def test_shapes_have_its_length_and_its_ends(chain) -> None:
-    hanging, drawn = chain.hanging(), chain.drawn(np.array([0.0, -0.3, -0.1]))
-    for line in (hanging, drawn):
-        assert line.shape == (21, 3)
-        assert line[[0, -1]] == pytest.approx(chain.tips, abs=1e-12)
-    lengths = np.linalg.norm(np.diff(hanging, axis=0), axis=1)
-    assert lengths == pytest.approx(chain.spring_length, rel=0.01)
-    assert drawn[10].tolist() == [0.0, -0.3, -0.1]
-    assert np.ptp(np.linalg.norm(np.diff(drawn, axis=0), axis=1)) < 1e-12

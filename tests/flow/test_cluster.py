@@ -8,7 +8,8 @@ import pytest
 
 from pipeline.flow import cluster
 from sling2sim2real.base.errors import UserError
-from tests.flow.toy import MEET, Toy, stage, wait_until
+from tests.flow.toy import MEET, Toy, stage
+from tests.project import until
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
@@ -72,9 +73,9 @@ def test_a_failure_on_a_worker_is_one_line_and_an_interrupt_ends_its_stage(
     assert status == 1 and lines[-1].endswith("; bad: bad"), lines
     toy.write({"endless": remote("endless", "none")})
     flow = toy.start("sling", "flow", "--dask", address)
-    wait_until((toy.folder / "begun").exists)
+    until((toy.folder / "begun").exists)
     assert toy.end(flow) == 130
-    wait_until(lambda: not [p for p in toy.processes() if "endless" in p.cmdline()], 20)
+    until(lambda: not [p for p in toy.processes() if "endless" in p.cmdline()], 20)
 
 
 def test_no_scheduler_is_one_line() -> None:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.flow.toy import MEET, Toy, stage, wait_until
+from tests.flow.toy import MEET, Toy, stage
+from tests.project import until
 
 pytestmark = pytest.mark.slow
 
@@ -78,7 +79,7 @@ def test_an_interrupt_ends_all_processes(tmp_path: Path, number: int) -> None:
     }
     toy = Toy(tmp_path, stages)
     flow = toy.start("sling", "flow")
-    wait_until(lambda: (tmp_path / "l.txt").exists() and (tmp_path / "r.txt").exists())
+    until(lambda: (tmp_path / "l.txt").exists() and (tmp_path / "r.txt").exists())
     assert toy.end(flow, number) == 130
     assert not toy.processes()
     assert toy.run("dvc", "status")[0] == 0
@@ -98,13 +99,11 @@ def test_after_a_kill_the_next_flow_does_what_is_stale_and_no_more(tmp_path: Pat
     toy = Toy(tmp_path, stages)
     (tmp_path / "pause").touch()
     flow = toy.start("sling", "flow")
-    wait_until((tmp_path / "begun").exists)
+    until((tmp_path / "begun").exists)
     toy.end(flow, signal.SIGKILL)
     assert "is busy" in toy.flow()[1][-1]
     (tmp_path / "pause").unlink()
-    wait_until(
-        lambda: not any("dvc.cli" in " ".join(process.cmdline()) for process in toy.processes())
-    )
+    until(lambda: not any("dvc.cli" in " ".join(process.cmdline()) for process in toy.processes()))
     status, lines = toy.flow()
     assert status == 0 and lines[-1].startswith("stages: 1 Completed ("), lines
     assert toy.read("runs") == "1\n1" and toy.read("long.txt") == "1"
@@ -120,7 +119,7 @@ def test_the_server_of_sling_ui_has_the_runs(tmp_path: Path) -> None:
     ui = toy.start("sling", "ui", "--port", str(port))
     address = f"http://127.0.0.1:{port}"
     try:
-        wait_until(lambda: answer(f"{address}/api/health"))
+        until(lambda: answer(f"{address}/api/health"))
         again = toy.run("sling", "ui")
         assert again == (0, [f"the UI of this project runs already: {address}"])
         assert toy.flow()[0] == 0

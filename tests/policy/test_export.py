@@ -13,7 +13,6 @@ import torch
 from pipeline.params import load
 from sling2sim2real.base.files import write_json
 from sling2sim2real.launching.surface.stored import Stored
-from sling2sim2real.policy.check import PolicyCheck, figures
 from sling2sim2real.policy.export import USED, card, write_onnx
 from sling2sim2real.simulator.parameters import THETA
 from tests.golden import expect_golden
@@ -106,23 +105,6 @@ runpy.run_path("policy_elsewhere.py", run_name="__main__")
     assert "the arm may hold 30 N" in message and "draw in 4.0 s, wait 2.0 s" in message
 
 
-@pytest.mark.slow
-def test_equal_networks_give_equal_bytes(trained, folder, tmp_path) -> None:
-    """In other processes, whose sets are in another order."""
-    torch.save(trained.policy, tmp_path / "network.pickle")
-    code = """
-import torch
-from pathlib import Path
-from sling2sim2real.policy.export import write_onnx
-write_onnx(torch.load("../network.pickle", weights_only=False), Path("policy.onnx"))
-"""
-    for seed in "12":
-        (tmp_path / seed).mkdir()
-        apart(code, tmp_path / seed, PYTHONHASHSEED=seed, PYTHONPATH=str(ROOT))
-        other = (tmp_path / seed / "policy.onnx").read_bytes()
-        assert other == (folder / "policy.onnx").read_bytes()
-
-
 FIGURES = {
     "converged": True,
     "criterion": "mean |y_p - g| <= 0.01 m over 256 targets, no failure",
@@ -151,8 +133,3 @@ def test_the_card_is_the_committed_one(seeing) -> None:
     assert versions["torch"] == torch.__version__.partition("+")[0] and len(versions) == len(USED)
     assert settings["setup"]["fork_width"] == 0.275
     expect_golden(json.dumps(content, indent=2) + "\n", Path(__file__).parent / "golden/card.json")
-
-
-def test_what_is_checked_is_what_the_card_says(trained) -> None:
-    checked = PolicyCheck(0.004, 0.011, {})
-    assert figures(trained, checked).keys() == FIGURES.keys()

@@ -33,16 +33,6 @@ def test_the_policy_hits_the_closed_form_within_a_centimetre(trained) -> None:
     np.testing.assert_allclose(trained.mean_error, error_of(trained), atol=1e-4)
 
 
-def test_the_curve_has_one_row_an_iteration(trained, settings) -> None:
-    curve = trained.curve
-    assert curve["iteration"] == list(range(1, settings.iterations + 1))
-    assert curve["mean_error"][trained.iteration - 1] == trained.mean_error
-    assert trained.mean_error < 1.1 * min(curve["mean_error"])
-    assert curve["mean_reward"][-1] > curve["mean_reward"][0]
-    assert curve["std"][0] == pytest.approx(settings.init_std)
-    assert sum(curve["failures"]) == sum(trained.failures.values()) > 0
-
-
 def short(settings, **changes) -> SimpleNamespace:
     return SimpleNamespace(**{**vars(settings), "iterations": 2, "envs": 64, **changes})
 
@@ -87,19 +77,6 @@ def test_on_simulated_launches_it_hits_without_a_map(toy_map, settings) -> None:
     assert launched == [*steps, 256] * iterations
     assert error_of(trained) == pytest.approx(trained.mean_error) and trained.mean_error <= 0.01
     assert trained.failures.keys() == {TOO_MUCH_FORCE}
-
-
-@pytest.mark.slow
-def test_a_learned_exploration_narrows_by_itself(toy_map, settings) -> None:
-    learned = SimpleNamespace(**{**vars(settings), "exploration": "learned"})
-    trained = train(toy_map, learned)
-    std = np.array(trained.curve["std"])
-    assert std[0] == pytest.approx(settings.init_std, rel=0.1)
-    assert settings.final_std < std[-1] < 0.8 * std[0]
-    other = SimpleNamespace(**{**vars(learned), "final_std": 0.1, "iterations": 2})
-    start = train(toy_map, other).curve["std"]
-    assert start == trained.curve["std"][:2]  # there is no schedule
-    assert error_of(trained) < 0.1
 
 
 def test_a_policy_that_sees_the_projectile_hits_too(seeing, trained, settings) -> None:

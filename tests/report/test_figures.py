@@ -6,12 +6,10 @@ import pandas as pd
 import pytest
 
 from pipeline.report.data import with_errors
-from pipeline.report.figures import landings, search
+from pipeline.report.figures import landings
 from sling2sim2real.drawing import canvas
 from sling2sim2real.drawing.styles import styles
-from sling2sim2real.identification.results.ranges import searched
 from tests.report.conftest import BAND, METHOD, launches
-from tests.report.toy_simulation import toy_landscape
 
 
 @pytest.fixture
@@ -63,47 +61,6 @@ def test_every_launch_lies_as_far_off_as_it_landed(retained) -> None:
     names = [label.get_text() for label in first.get_yticklabels()]
     assert names == ["paper", "DE_L"]
     assert {"measured (hollow)", "aimed at 1.725 m"} <= set(words(retained[0]))
-
-
-def test_a_landing_outside_the_area_is_a_failure_and_no_dot(retained) -> None:
-    outside = launches().assign(landing_y=[1.745, 1.0, 1.965, 2.6])
-    landings.misses("", with_errors(outside), {}, styles([METHOD]))
-    (ax,) = retained[0].axes
-    np.testing.assert_allclose(sorted(dots(ax)[0]), [2, 4])
-    assert [text.get_text() for text in ax.texts] == ["2 of 4 failed"]
-    assert not any("floor" in word for word in words(retained[0]))
-
-
-def test_what_is_far_off_lies_on_a_logarithmic_axis_that_says_so(retained) -> None:
-    for off, words in ((0.05, ""), (0.2, ", logarithmic beyond ± 10")):
-        trials = launches()
-        trials = with_errors(trials.assign(landing_y=trials.target + off))
-        landings.misses("", trials, {}, styles([METHOD]))
-        assert retained[-1].axes[0].get_xlabel() == f"landing − target [cm]{words}"
-
-
-def test_the_search_is_drawn_in_physical_values(retained, result, params) -> None:
-    """Failures are crosses, a region is an ellipse along its covariance, its path starts there."""
-    sigma = 0.01 * np.eye(5)
-    sigma[0, 2] = sigma[2, 0] = 0.009  # E and d
-    result.regions[0].sigma[:] = sigma
-    ranges, chart = searched(params, METHOD), toy_landscape(None, result)
-    search.search("", result, chart, ranges)
-    _, second, third, _ = retained[0].axes
-    assert len(second.collections[-1].get_offsets()) == 2  # of three; one failed
-    modulus, damping = ranges["youngs_modulus"], ranges["elasticity_damping"]
-
-    def at(place: float) -> list[float]:
-        return [1e-3 * modulus.at(place), 1e3 * damping.at(place)]
-
-    crosses, ellipse, path, _, star = third.lines
-    np.testing.assert_allclose(np.ravel(crosses.get_data()), at(0.5))
-    np.testing.assert_allclose(np.ravel(star.get_data()), at(0.75))
-    np.testing.assert_allclose(np.transpose(path.get_data()), [at(0.4), at(0.25), at(0.75)])
-    x, y = ellipse.get_data()
-    places = np.log(np.array([x / x.min(), y / y.min()])) / np.log([[1e7 / 3e4], [500]])
-    np.testing.assert_allclose(np.ptp(places, axis=1), 0.2, rtol=2e-3)  # twice a deviation
-    assert np.corrcoef(places)[0, 1] == pytest.approx(0.9, abs=0.02)
 
 
 def test_flights_lie_where_they_flew_and_were_expected(retained, params) -> None:

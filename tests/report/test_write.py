@@ -87,15 +87,6 @@ def test_a_theta_by_hand_needs_no_confidence(root, params, text_alone) -> None:
     assert "† The interval holds the draw's error alone" in text
 
 
-def test_says_of_a_policy_what_it_was_trained_on(root, params, text_alone) -> None:
-    maps, samples = "reads landings off maps", "512 × 4 samples each"
-    text = written(root, params)
-    assert maps in text and samples in text
-    text = written(root, with_(params, "policy", landings="simulated"))
-    assert maps not in text and samples not in text
-    assert "Training simulates every launch" in text and "512 × 4 simulated launches each" in text
-
-
 def test_names_the_input_that_is_missing(root, params) -> None:
     for name in (
         f"episodes/{BAND}/plain/1/signals.parquet",

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-import pytest
-from pydantic import ValidationError
-
 from pipeline.params import Params
 from rig.physics.draw import sampled
 from sling2sim2real.identification.posterior.likelihood import Tolerances
@@ -46,14 +43,6 @@ def test_launches_and_recordings_share_no_draw(params: Params) -> None:
         of_launches = key in params.rig.launch_draws
         assert (value_of(recording, key) != value_of(params, key)) != of_launches
         assert (value_of(launching, key) != value_of(params, key)) == of_launches
-
-
-@pytest.mark.parametrize("key", ["pads", "pads.colour", "nothing"])
-def test_a_key_that_is_no_number_is_refused(params: Params, key: str) -> None:
-    content = params.model_dump(mode="json", exclude_unset=True)
-    content["rig"]["draws"] = {key: [0.1, 1.0]}
-    with pytest.raises(ValidationError, match="is no number of the rig"):
-        Params.model_validate(content)
 
 
 ASSUMED = {  # of the identification and the lab, and the rig's number that it stands for

@@ -3,20 +3,8 @@
 import numpy as np
 import pytest
 
-from sling2sim2real.simulator import THETA, interact
-from tests.simulator.bands import BASE, BOX, neo, random_thetas
-
-
-def test_every_parameter_changes_the_episode(sling, episode):
-    others = np.tile(BASE, (5, 1))
-    for k in range(5):
-        others[k, k] = 2 * BASE[k] if k in (0, 2) else BOX[k].mean()
-    rollouts = interact(sling, episode, neo(np.array([BASE, *others])))
-    assert rollouts.failure == [None] * 6
-    force = np.abs(rollouts.force[1:] - rollouts.force[0]).max((1, 2))
-    line = np.abs(rollouts.center_line[1:] - rollouts.center_line[0]).max((1, 2, 3))
-    for name, changes in zip(THETA, (force > 0.01) | (line > 1e-3), strict=True):
-        assert changes, name
+from sling2sim2real.simulator import interact
+from tests.simulator.bands import BASE, neo, random_thetas
 
 
 def test_hand_and_clamps_hold_the_band_and_force_ends_with_the_release(sling, episode):

@@ -30,11 +30,6 @@ pytestmark = pytest.mark.slow  # the string is compiled
 LIMIT = 10.0  # mm, 2 % of the way that the middle goes
 
 
-@pytest.fixture(scope="module")
-def bench(params) -> Bench:
-    return Bench(params)
-
-
 def string_like(sling: ClampedBand, eta: float, edges: int = 96) -> ElasticString:
     """The rig's string of a sling's band, shear modulus YOUNG / 3."""
     law = law_of("ogden", [1 - SHARE, 2.0, -SHARE, -2.0])

@@ -12,7 +12,7 @@ from sling2sim2real.simulator import interact, launch
 from sling2sim2real.simulator.launch import memory_of_pull
 from sling2sim2real.simulator.model import LaunchHistory
 from sling2sim2real.simulator.parameters import Parameters
-from sling2sim2real.simulator.rubber import BRANCH_TIMES_S, RUBBER, flowed, overstress, update
+from sling2sim2real.simulator.rubber import BRANCH_TIMES_S, RUBBER, flowed
 from tests.simulator.bands import neo
 
 THETA = np.array([3e5, 0.45, 2e-3, 0.5, 0.7])
@@ -124,15 +124,3 @@ def test_flowing_on_is_flowing_longer():
         for _ in range(count):
             left = left / (1 + rate / count * np.abs(left / 3) ** 3)
         np.testing.assert_allclose(left, flowed(o, 1.0, rate), rtol=allowed)
-
-
-def test_updates_are_exact_for_straight_histories():
-    """Ramp of slope 1: o = t (1 - exp(-time / t)), whatever the steps."""
-    for count in (1, 7):
-        carried = overstress(np.linspace(0, 2.0, count + 1), 2.0 / count)
-        np.testing.assert_allclose(
-            carried, BRANCH_TIMES_S * -np.expm1(-2.0 / BRANCH_TIMES_S), rtol=1e-12
-        )
-    forget, follow = update(np.array([1e-6, 1e3]))
-    np.testing.assert_allclose(follow[0], 1, rtol=1e-3)
-    assert forget[1, :3].max() < 1e-40

@@ -28,20 +28,6 @@ def refusal(file: Path, text: str) -> str:
     return str(error.value)
 
 
-def test_values_out_of_range_are_named(tmp_path: Path) -> None:
-    wrong = {
-        "youngs_modulus": [0, 10**400],
-        "poissons_ratio": [0.5, -0.1],
-        "elasticity_damping": [10.0],
-        "dynamic_friction": [50, float("nan")],
-        "damping_scale": [1.01, True, "1"],
-    }
-    for name, value in ((name, value) for name, values in wrong.items() for value in values):
-        text = json.dumps({"band": "red", "theta": SOFT | {name: value}})
-        message = refusal(tmp_path / "theta.json", text)
-        assert f"theta.{name}: must be " in message and "between" in message and len(message) < 300
-
-
 def test_what_is_no_json_object(tmp_path: Path) -> None:
     for text in ("[" * 200_000, "", "{", "1" * 5000):
         assert "cannot be read as JSON" in refusal(tmp_path / "theta.json", text)
@@ -84,17 +70,6 @@ def test_the_law_rubber_names_its_parameters(tmp_path: Path) -> None:
         assert message in refusal(file, json.dumps(whole | change))
 
 
-def test_bad_nuisances_are_one_line(tmp_path: Path) -> None:
-    for output, message in (
-        ({"drag": 1.0}, "nuisances.drag: unknown key, the closest known one is air_drag"),
-        ([1.0], "nuisances: must be a mapping"),
-        ({"air_drag": -1}, "nuisances.air_drag: must be between 0 and 50, got -1"),
-        ({"air_drag": True}, "nuisances.air_drag: must be a number between 0 and 50"),
-    ):
-        text = json.dumps({"band": "red", "theta": SOFT, "nuisances": output})
-        assert message in refusal(tmp_path / "theta.json", text)
-
-
 def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:
     best = Parameters.of("neo_hookean", [*SOFT.values()], air_drag=0.7)
     path, samples = tmp_path / "none.json", np.linspace(0.1, 1, 15).reshape(3, 5)
@@ -114,11 +89,3 @@ def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:
     path.write_text(json.dumps(content | {"names": with_drag["names"]}))
     with pytest.raises(UserError, match="samples: must have a column for each"):
         load_samples(path, best)
-
-
-def test_the_law_corotated_is_named_and_has_the_five_parameters(tmp_path: Path) -> None:
-    written = content_of(Parameters.of("corotated", [*SOFT.values()]))
-    file = tmp_path / "theta.json"
-    file.write_text(json.dumps({"band": "red"} | written))
-    assert written["law"] == "corotated" and "history" not in written
-    assert parameters_of(load_theta(file, "red")).law == "corotated"

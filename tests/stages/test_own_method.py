@@ -60,3 +60,5 @@ def test_a_search_of_ones_own_finds_theta(tmp_path: Path, monkeypatch: pytest.Mo
         assert not ended.value.code
     content = json.loads(layout.theta(mine).read_text())
     assert content["method"] == "mine" and content["rollouts"] == 5 * (1 + 1) + 15
+    shown = json.loads(layout.metrics(mine).read_text())[mine.key]  # of `dvc metrics diff`
+    assert shown["E_kPa"] == pytest.approx(1e-3 * content["theta"]["youngs_modulus"], rel=1e-3)

@@ -8,15 +8,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from pipeline.params import load
 from sling2sim2real.base.files import NotMade
-from sling2sim2real.identification.objective.box import SearchBox
-from sling2sim2real.identification.objective.evaluate import Evaluation
-from sling2sim2real.identification.objective.loss import TERMS
-from sling2sim2real.identification.results.evaluations import Evaluations
 from stages.start import remedy
 from tests.project import DEFAULTS, ROOT, alive, python, until
 from validation.projects import environment
@@ -61,21 +55,6 @@ def test_unknown_names(stage) -> None:
     assert line.startswith("error: band9-paper: not under run.pairs in params.yaml, which has band")
     status, line = stage("clamps", "band1-best")
     assert status == 1 and line.startswith("error: band1-best: not under run.recordings in params")
-
-
-def test_a_history_that_failed_says_why(stage) -> None:
-    space = SearchBox.of(load(DEFAULTS).parameters)
-    unit = np.random.default_rng(1).random((30, 5))
-    nothing = {term: np.full(30, np.nan) for term in TERMS}
-    theta, reasons = space.to_physical(unit), ["the band slipped"] * 30
-    history = Evaluations("paper", space.names)
-    history.add(
-        Evaluation(unit, theta, nothing, np.full(30, np.inf), reasons), phase="de", generation=0
-    )
-    history.save(Path("data/history/band1-paper.parquet"))
-    status, line = stage("clusters", "band1-paper")
-    assert status == 1
-    assert line.startswith("error: paper: each of 30 simulations failed (the band slipped)")
 
 
 def test_missing_inputs(stage) -> None:

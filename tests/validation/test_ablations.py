@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.params import load
 from validation.campaigns.ablations import FIRST, PAPER, Job, jobs_of, summary
-from validation.campaigns.variants import rollouts_of_search, with_preset, with_variants
 from validation.paired import compared, mean_interval
-from validation.projects import DEFAULTS
 
 
 def test_pairs_are_compared_where_both_are_there() -> None:
@@ -51,14 +48,3 @@ def test_a_summary_pairs_recordings_and_spreads_seeds() -> None:
     assert (paper["run"], paper["without_landing"], paper["targets_out_of_reach"]) == (3, 1, 2)
     assert band[f"less_{PAPER}"]["bo"]["mean"] == pytest.approx(3)
     assert band[f"less_{PAPER}"]["bo"]["n"] == 2
-
-
-def test_each_variant_changes_something_and_a_preset_the_budget() -> None:
-    default = load(DEFAULTS)
-    usual, large = (with_variants(with_preset(default, PAPER, name)) for name in (None, "large"))
-    plain = usual.methods.keys() - default.methods.keys()
-    assert len(plain) == 1
-    assert all(usual.methods[name] != usual.methods[PAPER] for name in plain)
-    assert with_preset(default, "posterior", "large") == default
-    assert [rollouts_of_search(params, PAPER) for params in (usual, large)] == [600, 5760]
-    assert rollouts_of_search(with_variants(with_preset(default, "bo", "large")), "bo") == 2400

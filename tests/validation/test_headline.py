@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from validation import headline
-from validation.campaigns.rig_scores import TARGETS
 from validation.campaigns.runner import PAPER, POSTERIOR
 
 
@@ -43,15 +42,3 @@ def test_a_difference_is_claimed_only_where_all_bands_agree(same) -> None:
     near["methods"][POSTERIOR] = {"miss_cm_each": [0.5]}
     text = headline.differences({"figures": same["figures"] | {"band1": near}})
     assert "−0.5, +10.0 and +10.0 cm" in text and text.endswith("no difference is shown.")
-
-
-def test_dips_are_those_of_new_bands_without_a_launch() -> None:
-    line = {"method": POSTERIOR, "pull": "informative", "launched": False}
-    scores = {"error": (0.01 / TARGETS).tolist()}
-    lines = [
-        line | {"band": band, "scores": scores} | change
-        for band in headline.BANDS
-        for change in ({}, {"launched": True}, {"method": PAPER}, {"failed": "no"})
-    ]
-    each = headline.dips(lines)
-    assert [values.tolist() for values in each.values()] == [pytest.approx([1.0])] * 3

@@ -11,32 +11,12 @@ from rig.physics.launch import Trial
 from validation.campaigns import rig_scores
 from validation.campaigns.landings import (
     FIRST,
-    SETS,
     OneRecording,
     figures,
-    jobs,
 )
 from validation.campaigns.rig_scores import TARGETS
-from validation.campaigns.runner import POSTERIOR
 from validation.projects import DEFAULTS
 from validation.rubbers import DEVELOP, SEALED, UNSEEN_LAWS, rubbers
-
-
-def test_each_band_is_recorded_by_each_pull_and_compared_by_its_first_recording() -> None:
-    for name, (seed, bands, numbers, pulls) in SETS.items():
-        every = jobs(name)
-        assert len(set(every)) == len(every) and {job.seed for job in every} == {seed}
-        other = [job for job in every if job.launched or job.method != POSTERIOR]
-        compared = {
-            "paper, virgin, the paper's method",
-            "informative, virgin, the paper's method",
-            "informative, virgin, one launch",
-        }
-        assert {job.kind for job in other} == (compared if 0 in numbers else set())
-        assert len(other) == len(bands) * len({job.kind for job in other})
-        assert len(every) - len(other) == len(pulls) * len(numbers) * len(bands)
-    job = OneRecording(DEVELOP, "develop1", "informative", 0)
-    assert job.params.rig.recordings["plain"].pull == "informative"
 
 
 def test_half_of_the_sealed_rubbers_soften_by_laws_that_none_was_developed_on() -> None:

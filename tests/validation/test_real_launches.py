@@ -1,13 +1,11 @@
 """Fits to measured launches: against energy's conservation, and on the measurements themselves."""
 
-import csv
-
 import numpy as np
 import pytest
 
 from pipeline.layout import ROOT
 from validation import real_launches
-from validation.real_launches import FILE, SIZES, Slingshot
+from validation.real_launches import FILE, Slingshot
 
 DATA = ROOT.parent / "shared/data/real" / FILE
 DAMPING = 1e-3  # s
@@ -44,30 +42,6 @@ def test_a_fit_finds_the_modulus_and_the_mass_that_made_the_speeds(band) -> None
     assert real_launches.modulus_by_weight(measured, DAMPING) == pytest.approx(1.1e6, rel=0.002)
 
 
-def test_the_formula_fits_speeds_that_it_made(band) -> None:
-    speed = np.sqrt(2 * 3.0 / (band.mass + 1e-3))
-    measured = Slingshot(**{**vars(band), "speed": speed})
-    left = real_launches.formula_off(measured, np.array([True, False, False, False, True]))
-    assert left == pytest.approx(0, abs=1e-3)
-
-
-def test_shots_become_medians_from_light_to_heavy(tmp_path) -> None:
-    columns = "band_type,pellet_type,calc_mass_g,velocity_mps,draw_length_m,slack_length_m"
-    shots = {("heavy", 8.0): (20.0, 21.0, 40.0), ("light", 0.5): (50.0, 51.0, 52.0)}
-    rows = [
-        ["band_A", *pellet, speed, 0.8, 0.27, 1.0]
-        for pellet, speeds in shots.items()
-        for speed in speeds
-    ]
-    file = tmp_path / "launches.csv"
-    with file.open("w", encoding="utf-8", newline="") as lines:
-        csv.writer(lines).writerows([[*columns.split(","), "draw_weight_kg"], *rows])
-    (band,) = real_launches.read(file)
-    assert band.speed.tolist() == [51.0, 21.0]
-    assert band.mass == pytest.approx([0.5e-3, 8e-3])
-    assert band.scatter[0] == pytest.approx(1 / 51)
-
-
 @pytest.mark.skipif(not DATA.is_file(), reason=f"measured launches are not there: {DATA}")
 def test_three_pellets_tell_the_speeds_of_the_others() -> None:
     band = next(band for band in real_launches.read(DATA) if band.name == "band_B")
@@ -75,10 +49,3 @@ def test_three_pellets_tell_the_speeds_of_the_others() -> None:
     fit = real_launches.fitted(band, 1.15e-3, chosen)
     rod = real_launches.rms(real_launches.off(band, fit, 1.15e-3)[~chosen])
     assert rod < 1 < real_launches.rms(real_launches.formula_off(band, chosen)[~chosen])
-
-
-@pytest.mark.skipif(not DATA.is_file(), reason=f"measured launches are not there: {DATA}")
-def test_the_six_bands_and_their_pellets_are_read() -> None:
-    bands = real_launches.read(DATA)
-    assert [band.name for band in bands] == [*SIZES]
-    assert [len(band.mass) for band in bands] == [13, 13, 13, 12, 11, 11]

@@ -1,23 +1,15 @@
 """What campaigns share: a run that was killed goes on, and a failure is a result."""
 
 import os
-import time
-from argparse import Namespace
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sling2sim2real.base.errors import UserError
 from validation.campaigns.runner import (
-    THREADS,
     ResultLines,
-    prepare,
-    results_of,
     run,
-    single_threaded,
 )
 from validation.reports import plain
 
@@ -49,19 +41,6 @@ def test_a_run_that_was_killed_goes_on(tmp_path) -> None:
     assert [row["number"] for row in some] == [3, 2]
 
 
-def slow(job: Square) -> dict:
-    time.sleep(60)
-    return job()
-
-
-def test_a_run_ends_when_the_time_is_over(tmp_path, capsys) -> None:
-    """Also what is under way."""
-    lines, begin = ResultLines(tmp_path / "results.jsonl"), time.monotonic()
-    run(slow, [Square(n) for n in range(50)], lines, 1, minutes=0.02)
-    assert time.monotonic() - begin < 50
-    assert not lines.lines and "the time is over" in capsys.readouterr().out
-
-
 def broken(job: Square) -> dict:
     if job.number == 1:
         raise ValueError("a fault of ours")
@@ -73,40 +52,6 @@ def test_an_error_ends_the_run_and_what_was_done_is_kept(tmp_path) -> None:
     with pytest.raises(ValueError, match="a fault of ours"):
         run(broken, [Square(n) for n in range(200)], lines, 1)
     assert Square(0) in lines.of(Square) and len(lines.lines) < 200
-
-
-def test_threads_are_as_before_after_the_block(monkeypatch) -> None:
-    monkeypatch.setenv(THREADS[0], "7")
-    monkeypatch.delenv(THREADS[1], raising=False)
-    with single_threaded():
-        assert {os.environ[name] for name in THREADS} == {"1"}
-    assert os.environ[THREADS[0]] == "7" and THREADS[1] not in os.environ
-
-
-@pytest.mark.parametrize("only", [False, True])
-def test_results_by_arguments_are_of_these_jobs_and_made_where_missing(tmp_path, only) -> None:
-    args = Namespace(work=tmp_path, workers=1, minutes=10.0, report_only=only)
-    ResultLines(tmp_path / "results.jsonl").add({"number": 2, "square": 4})
-    lines = results_of(args, Square.__call__, [Square(3), Square(2)], seed=1)
-    assert [line["number"] for line in lines] == ([2] if only else [3, 2])
-    assert all(line["square"] == line["number"] ** 2 for line in lines)
-    assert [line for line in lines if "seed" in line] == lines[:-1]  # in what was made now
-    with pytest.raises(UserError, match=f"^{tmp_path}: holds no result of these jobs yet$"):
-        results_of(Namespace(**{**vars(args), "report_only": True}), None, [Square(7)])
-
-
-def test_what_jobs_need_is_prepared_unless_a_report_is_all(tmp_path) -> None:
-    args = Namespace(workers=1, minutes=10.0, report_only=False)
-    prepare(args, partial(touch, tmp_path), [Square(1), Square(2)])
-    assert {file.name for file in tmp_path.iterdir()} == {"1", "2"}
-    prepare(Namespace(report_only=True), None, [Square(3)])
-    args.minutes = 0.0
-    with pytest.raises(UserError, match="^--minutes: only 0 of 1 are prepared$"):
-        prepare(args, slow, [Square(4)])
-
-
-def touch(folder: Path, job: Square) -> None:
-    (folder / str(job.number)).touch()
 
 
 def test_results_are_plain_json() -> None:

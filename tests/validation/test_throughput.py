@@ -1,19 +1,14 @@
 """The yardstick of `sling bench` is an interaction that the simulator carries through."""
 
-from contextlib import nullcontext
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from pipeline.params import load
-from sling2sim2real.base.native import start, wp
 from sling2sim2real.simulator.interaction import interact
 from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
 from tests.project import DEFAULTS
-from validation import synthetic
-from validation import throughput as bench
+from validation import bench, synthetic
 
 PARAMS = load(DEFAULTS)
 
@@ -32,23 +27,10 @@ def test_the_yardstick_is_held_drawn_and_let_go() -> None:
 
 @pytest.mark.parametrize("law", bench.BOXES)
 def test_it_counts_rollouts_and_launches(monkeypatch, law: str) -> None:
-    """With kernels that are compiled already."""
-    start()
-    cache = nullcontext(Path(wp.config.kernel_cache_dir).parent)
-    monkeypatch.setattr(bench.tempfile, "TemporaryDirectory", lambda: cache)
-    monkeypatch.setitem(bench.BATCHES, "cpu", (2, 4))
+    monkeypatch.setitem(bench.BATCHES, "cpu", (2,))
     monkeypatch.setattr(bench.os, "cpu_count", lambda: 1)
     result = bench.bench(PARAMS, law=law)
-    assert result["law"] == law
-    assert [entry["environments"] for entry in result["batches"]] == [2, 4]
-    for entry in result["batches"]:
-        assert all(np.isfinite(value) and value > 0 for value in entry.values())
-        for what in ("rollouts", "rollouts_with_loss"):
-            rate = entry["environments"] / entry[f"{what}_s"]
-            assert entry[f"{what}_per_s"] == pytest.approx(rate)
-    steps = result["yardstick"]["steps"]
-    held, sling = synthetic.RELEASE - synthetic.GRASP, PARAMS.sling
-    assert held / sling.hold_step < steps["held"] < held / sling.grip_step / 2
-    assert result["yardstick"]["newton_iterations"] >= sum(steps.values())
-    assert min(result["first_start_s"].values()) > 0
-    assert str(steps["recoil"]) in bench.table(result)
+    (entry,) = result["batches"]
+    assert all(np.isfinite(value) and value > 0 for value in entry.values())
+    assert entry["rollouts_per_s"] == pytest.approx(2 / entry["rollouts_s"])
+    assert str(result["yardstick"]["steps"]["recoil"]) in bench.table(result)

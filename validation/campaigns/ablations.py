@@ -42,7 +42,7 @@ from validation.projects import with_section
 from validation.reports import row, write_report
 
 WORK = Path("data/ablations")
-REPORT = Path("reports/validation/ablations.json")
+REPORT = Path("reports/validation/ablations-large.json")
 FIRST, SEEDS = 1001, 5  # rig seed of the first recording; search seeds on it
 
 

@@ -10,9 +10,8 @@ import pytest
 from pipeline.layout import ROOT
 from pipeline.params import Params, load
 from sling2sim2real.base.files import write_json
-from validation.environment import environment
 from validation.projects import DEFAULTS
-from validation.reports import plain
+from validation.reports import environment, plain
 
 
 @pytest.fixture(scope="session")

@@ -44,7 +44,7 @@ from validation.projects import DEFAULTS
 from validation.reports import paragraph, plain, row, write_report
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
-WORK, PULLS = Path(".checkpoints/landings"), ("paper", "informative")
+WORK, PULLS = Path(".checkpoints/landings"), ("informative", "paper")
 OTHERWISE: tuple[tuple[str, dict], ...] = (  # how the first recording of a band is identified too
     ("informative", {"launched": True}),
     ("informative", {"method": PAPER}),
@@ -87,7 +87,7 @@ class OneRecording:
 SETS = {
     "develop": (DEVELOP, tuple(rubbers(DEVELOP)), range(RECORDINGS), PULLS),
     "sealed": (SEALED, tuple(rubbers(SEALED)), range(RECORDINGS), PULLS),
-    "bands": (DEVELOP, BANDS, FRESH, PULLS[1:]),
+    "bands": (DEVELOP, BANDS, FRESH, PULLS[:1]),
 }
 
 
@@ -96,8 +96,8 @@ def jobs(name: str, most: int = len(FRESH)) -> list[OneRecording]:
     seed, bands, numbers, pulls = SETS[name]
     recorded = [
         OneRecording(seed, band, pull, number)
-        for number in numbers[:most]
         for pull in pulls
+        for number in numbers[:most]
         for band in bands
     ]
     otherwise = [

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 SLACK = 1.05  # stretch below which a crosshead shows grips and slack
 
@@ -54,37 +54,32 @@ def multiaxial(folder: Path) -> dict[str, dict[str, np.ndarray]]:
 
     Cauchy stresses are taken back to nominal ones.
     """
-    sources: dict[str, dict[str, list]] = {}
-    file = folder / "rubber_multiaxial" / "rubber_multiaxial.csv"
-    with file.open(encoding="utf-8-sig") as lines:
-        for row in csv.DictReader(lines):
-            stretches = [float(row[name]) for name in ("F11", "F22", "F33")]
-            stresses = [float(row[name] or "nan") for name in ("S11", "S22")]
-            if row["stress_type"] == "cauchy":
-                stresses = [s / stretch for s, stretch in zip(stresses, stretches, strict=False)]
-            modes = sources.setdefault(row["source"], {})
-            modes.setdefault(row["mode"], []).append([*stretches, *stresses])
-    return {source: {m: np.array(v) for m, v in modes.items()} for source, modes in sources.items()}
+    table = pd.read_csv(folder / "rubber_multiaxial" / "rubber_multiaxial.csv")
+    for stress, stretch in (("S11", "F11"), ("S22", "F22")):
+        true = table.stress_type == "cauchy"
+        table[stress] = table[stress].where(~true, table[stress] / table[stretch])
+    columns = ["F11", "F22", "F33", "S11", "S22"]
+    return {
+        source: {
+            mode: rows[columns].to_numpy(float) for mode, rows in of.groupby("mode", sort=False)
+        }
+        for source, of in table.groupby("source", sort=False)
+    }
 
 
 def latex(folder: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Time [s], crosshead [mm] and load [N] of latex drawn in 240 s and held for a day."""
-    file = folder / "latex_relaxation_24h" / "latex_relaxation_24h.csv"
-    with file.open(encoding="utf-8-sig") as lines:
-        rows = [
-            [float(row[name]) for name in ("time_s", "displacement_mm", "load_N")]
-            for row in csv.DictReader(lines)
-        ]
-    table = np.array(rows)
-    table = table[np.unique(table[:, 0], return_index=True)[1]]
-    return table[:, 0], table[:, 1], table[:, 2]
+    table = pd.read_csv(folder / "latex_relaxation_24h" / "latex_relaxation_24h.csv")
+    table = table.drop_duplicates("time_s").sort_values("time_s")
+    return tuple(table[name].to_numpy() for name in ("time_s", "displacement_mm", "load_N"))
 
 
 def acrylic(folder: Path) -> list[Curve]:
     """VHB 4910, no rubber: cycles at three rates and holds of 400 s."""
-    curves = []
-    for file in sorted((folder / "vhb4910").glob("*.csv")):
-        with file.open(encoding="utf-8-sig") as lines:
-            table = np.array([[float(cell) for cell in row] for row in list(csv.reader(lines))[1:]])
-        curves.append(Curve(file.stem, table[:, 1], table[:, 2], table[:, 0]))
-    return curves
+    tables = {file.stem: pd.read_csv(file) for file in sorted((folder / "vhb4910").glob("*.csv"))}
+    return [
+        Curve(name, stretch, stress, time)
+        for name, (time, stretch, stress) in (
+            (name, table.to_numpy(float).T[:3]) for name, table in tables.items()
+        )
+    ]

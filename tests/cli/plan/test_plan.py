@@ -18,7 +18,6 @@ from sling2sim2real.cli.plan import limits
 from sling2sim2real.cli.plan.force import Held, Prediction
 from sling2sim2real.cli.plan.messages import COLUMNS
 from sling2sim2real.cli.plan.plan import known_band, plan_recording
-from sling2sim2real.cli.plan.trajectory import Phase, Trajectory
 from sling2sim2real.settings.lab import Dip, Gripper
 from tests.project import DEFAULTS, with_
 
@@ -112,25 +111,6 @@ def test_the_gripper_opens_closes_and_opens(plan, tmp_path) -> None:
     assert times == pytest.approx([0.0, content["grasp_s"], content["release_s"]])
 
 
-def franka_moves_to(command: dict, width: float) -> float:
-    """What Franka's own action server makes of a command, given the gap as it is.
-
-    gripper_action_server.cpp of franka_ros2, onGripperCommand; RuntimeError where it aborts.
-    """
-    target, most = 2 * command["position"], 0.08
-    if target > most or target < 0:
-        raise RuntimeError(f"Commanding out of range width! max_width = {most} command = {target}")
-    return max(target, 0.006) if target < width else target  # a band of 6 mm between the fingers
-
-
-def test_a_frankas_own_server_opens_closes_and_opens(params, tmp_path) -> None:
-    plan, width, gaps = plan_recording(params, BAND, pulls=2), 0.02, []
-    for row in json.loads(plan.write(tmp_path, 10.0)[1].read_text()):
-        width = franka_moves_to(row["command"], width)
-        gaps.append(width)
-    assert gaps == [0.08, 0.006, 0.08, 0.006, 0.08]
-
-
 @pytest.mark.parametrize(
     ("position", "wanted"),
     [("finger", (0.04, 0.0)), ("gap", (0.08, 0.0)), ([0.0, 0.8], (0.0, 0.8)), ([85, 0], (85, 0))],
@@ -141,7 +121,7 @@ def test_other_grippers_take_other_numbers(position, wanted) -> None:
     assert (gripper.command(0.08), gripper.command(0.0)) == pytest.approx(wanted)
 
 
-@pytest.mark.parametrize("position", ["width", [0.1], [0.1, 0.1], [0.1, "x"], None, [0, math.nan]])
+@pytest.mark.parametrize("position", ["width", [0.1, 0.1], [0, math.nan]])
 def test_a_position_that_is_none_is_refused(position) -> None:
     text = DEFAULTS.read_text()
     wrong = text.replace("position: finger}", f"position: {json.dumps(position)}}}")
@@ -169,19 +149,6 @@ def test_without_a_base_the_plan_is_in_frame_o_and_says_so(params, tmp_path) -> 
         plan_recording(turned, BAND)
 
 
-def test_what_is_printed(plan, tmp_path) -> None:
-    text = plan.to_text([tmp_path / "a.csv"])
-    assert f"wrote {tmp_path / 'a.csv'}" in text
-    assert "not checked: the band is not identified" in text
-    content = json.loads(plan.to_json([tmp_path / "a.csv"]))
-    assert content["files"] == [str(tmp_path / "a.csv")]
-    assert content["base_to_fork"] == pytest.approx(FORK_IN_BASE)
-    pull = next(row for row in content["phases"] if row["phase"] == "pull")
-    assert pull["fork"] == [0.0, -0.35, -0.1]
-    assert pull["base"] == pytest.approx([0.35, 0.1, 0.3])
-    assert pull["max_speed_m_s"] == pytest.approx(0.2, rel=1e-3)
-
-
 @pytest.mark.parametrize(
     ("section", "values", "expected"),
     [
@@ -190,10 +157,7 @@ def test_what_is_printed(plan, tmp_path) -> None:
             {"draw": (-0.6, 0.0)},
             "y = -0.6 m lies 0.15 m beyond the -0.45 m of setup.draw",
         ),
-        ("plan", {"draw": (-0.3, -0.4)}, "z = -0.4 m lies 0.1 m beyond the -0.3 m of setup.draw_z"),
-        ("plan", {"draw": (-0.3, 0.5)}, "z = 0.5 m lies 0.5 m beyond the 0 m of setup.draw_z"),
         ("plan", {"draw": (-1e-300, 0.0)}, "draw by 0.251 m at least, not 0.000 m"),
-        ("plan", {"draw": (-0.2, 0.0)}, "stretches the band to 0.93 of its rest length"),
         ("plan", {"floor_clearance": 0.4}, "0.318 m above the floor, 0.082 m less than plan.floor"),
         ("plan", {"orientation": (0.5, 0.5, 0.5, -0.5)}, "plan.orientation: the fingers (z) would"),
         (
@@ -204,13 +168,7 @@ def test_what_is_printed(plan, tmp_path) -> None:
         ("episode", {"longest": 7.0}, "it takes 7.71 s, 1.51 s more than episode.longest 7 less"),
         ("plan", {"pull_speed": 0.05}, "raise plan.pull_speed, or raise episode.longest to "),
         ("plan", {"dips": (dip(depth=0.4),)}, "dip 1 lets the band back by 0.4 m from 0.4 m, and"),
-        ("plan", {"dips": (dip(at=0.5, depth=0.3),)}, "from 0.2 m, and would pass the fork"),
         ("plan", {"dips": (dip(out_time=0.4),)}, "the let back (plan.dips) reaches 0.5 m/s, 0.1"),
-        (
-            "plan",
-            {"dips": (dip(back_time=15.0),)},
-            "take --pull paper, or shorter plan.dips, or raise",
-        ),
     ],
 )
 def test_what_is_refused_and_how_it_is_said(params, section, values, expected) -> None:
@@ -240,18 +198,6 @@ def test_the_informative_pull_is_the_default(params, tmp_path) -> None:
     assert "informative, with 2 dips" in plan.to_text([])
     assert "paper, with 0 dips" in paper.to_text([])
     assert len(plan.write(tmp_path, 100.0)) == 3
-
-
-def test_speed_and_acceleration_of_any_trajectory(params) -> None:
-    """A leg of 0.4 m in 1 s reaches 0.8 m/s and 3.2 m/s^2."""
-    leg = [Phase("lift", np.array([0.0, 0.0, 0.4]), 1.0, 0.0)]
-    fast = Trajectory.through(np.zeros(3), 0.0, leg)
-    with pytest.raises(UserError, match=r"lift reaches 0.8 m/s, 0.4 more than plan.max_speed 0.4"):
-        limits.check_motion(fast, params.plan)
-    loose = with_(params.plan, "", max_speed=0.8)
-    with pytest.raises(UserError, match=r"lift reaches 3.2 m/s\^2, 1.2 more than plan.max_acc"):
-        limits.check_motion(fast, loose)
-    limits.check_motion(fast, with_(loose, "", max_acceleration=3.2))
 
 
 def test_a_held_string_pulls_as_its_formula() -> None:
@@ -294,18 +240,9 @@ def test_a_band_to_come_is_planned_by_its_sizes(params, fitted, tmp_path, monkey
     stretches = (plan_recording(params, b).about["stretch"] for b in (longer.band, BAND))
     assert next(stretches) < next(stretches)
     assert known_band(None, {"rest_length": 0.6}).band.diameter == 0.010  # the usual one
-    for arguments, words in (
-        ((None, {}), "give a band's folder, or --diameter and --rest-length of one to come"),
-        ((Path("bands/no"), {}), "bands/no: is no folder of a band"),
-        ((None, {"rest_length": 0.2}), "--rest-length 0.2: must be longer than setup.fork_width"),
-    ):
-        with pytest.raises(UserError, match=words):
-            known_band(*arguments)
     monkeypatch.chdir(fitted)
     known = known_band(Path("bands/toy"), {})
     assert known.band.name == "toy" and known.found
-    with pytest.raises(UserError, match="band.yaml has the band's sizes: leave these out"):
-        known_band(Path("bands/toy"), {"mass": 0.04})
 
 
 def test_where_the_fork_was_identified_it_stands(params) -> None:

@@ -13,7 +13,6 @@ from sling2sim2real.episode.planned import leg_time
 from sling2sim2real.episode.window import LEAD
 from sling2sim2real.recording.events import CALM
 from sling2sim2real.settings import PlanParams
-from sling2sim2real.settings.lab import Dip
 from tests.project import DEFAULTS, with_
 
 PARAMS = with_(load(DEFAULTS), "plan", dips=())
@@ -148,23 +147,3 @@ def test_any_plan_rests_in_time_and_within_its_limits(content, angle, duration, 
     held = way.opening(np.linspace(grasp + plan.finger_time + TICK, release, 9))
     np.testing.assert_allclose(held, 0.0, atol=1e-9)
     assert way.opening(0.0) == way.opening(way.duration) == 0.08
-
-
-def test_a_dip_lets_the_band_back_and_draws_it_again() -> None:
-    """One on the way and one at the draw; the parts of the pull keep to its speed."""
-    halfway = Dip(at=0.5, depth=0.05, out_time=0.4, back_time=0.6)
-    deep = Dip(at=1.0, depth=0.3, out_time=2.0, back_time=3.0)
-    settings = with_(PARAMS.plan, "", dips=(deep, halfway))
-    rest = PARAMS.setup, PARAMS.episode, PARAMS.bands["band1"], AHEAD
-    way = trajectory_of(settings, *rest)
-    names = [phase.name for phase in way.phases]
-    first = names.index("pull")
-    assert names[first : first + 7] == [
-        "pull", "let back", "redraw", "pull", "let back", "redraw", "pause",
-    ]  # fmt: skip
-    times = way.times[first : first + 7]
-    np.testing.assert_allclose(np.diff(times), [2.0, 0.4, 0.6, 2.0, 2.0, 3.0], atol=1e-9)
-    reached = [0, -0.2, -0.15, -0.2, -0.4, -0.1, -0.4]
-    np.testing.assert_allclose(way.position(times)[:, 1], reached, atol=1e-12)
-    np.testing.assert_allclose(way.position(times, 1), 0, atol=1e-12)
-    assert set(way.openings[first : first + 8]) == {PARAMS.plan.gripper.closed}

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sling2sim2real.cli.plan.trajectory import Phase, Trajectory
-from sling2sim2real.episode.planned import leg_time
 
 COORDINATE = st.floats(-1, 1).map(lambda x: round(x, 4))
 POINT = st.tuples(COORDINATE, COORDINATE, COORDINATE).map(np.array)
@@ -16,19 +15,6 @@ PHASE = st.builds(
 TRAJECTORY = st.builds(
     Trajectory.through, POINT, st.just(0.08), st.lists(PHASE, min_size=1, max_size=5)
 )
-
-
-@given(length=st.floats(1e-3, 3), speed=st.floats(0.01, 3), acceleration=st.floats(0.05, 30))
-def test_a_leg_meets_one_limit_and_keeps_the_other(length, speed, acceleration) -> None:
-    time = leg_time(length, speed, acceleration)
-    way = length * np.array([0.6, 0.0, -0.8])
-    leg = Trajectory.through(np.zeros(3), 0.0, [Phase("leg", way, time, 0.0)])
-    used = leg.peaks(1)[0] / speed, leg.peaks(2)[0] / acceleration
-    assert max(used) == pytest.approx(1.0, rel=1e-9)
-    for derivative in (1, 2):
-        sampled = leg.position(np.linspace(0, time, 4001), derivative)
-        largest = np.linalg.norm(sampled, axis=1).max()
-        assert leg.peaks(derivative)[0] == pytest.approx(largest, rel=1e-6)
 
 
 @given(trajectory=TRAJECTORY)

@@ -24,7 +24,6 @@ from validation.recordings.bag import (
     Truth,
     blind_bag,
     edit,
-    head,
     write_bag,
 )
 
@@ -58,29 +57,16 @@ def test_the_report_of_a_good_recording(looked, seen) -> None:
 
 
 def test_the_verdict_and_its_cautions_come_first(looked) -> None:
+    """Then what it rests on; of several pulls, of which it is."""
     cautions = [Finding("gap", "the force has a gap", "record it again").content()]
     for problem, verdict in ((None, "can be used, but:"), ("no force", "cannot be used: no force")):
         report = looked.report | {"cautions": cautions, "problem": problem}
         lines = to_text(report).splitlines()
         assert lines[2:4] == [verdict, "  - the force has a gap: record it again"]
-        basis = lines.index("it rests on")
-        assert lines[basis + 1].startswith("  force: at most ")
-        assert lines[basis + 2].startswith("  motion: loading 25 to 38 cm at 0.23 m/s, pause ")
-        assert lines[basis + 3].startswith("  not in it, so known by a prior alone: softening and")
-        assert lines[basis + 4].startswith("  pictures: the band is in ")
-        assert "0.52 m long, assumed: --diameter 0.01 and --rest-length" in lines[basis + 5]
-        assert lines[basis + 6].startswith(
-            "  no mass given, so its weight and the force's direction"
-        )
-        assert (
-            basis
-            < lines.index("signals")
-            < lines.index("chosen (to keep it, or another one: in band.yaml)")
-        )
+        assert lines.index("it rests on") < lines.index("signals")
     pulls = [pull_line(looked.report) | {"number": number} for number in (1, 2)]
     lines = to_text(looked.report | {"pulls": pulls, "cautions": cautions}).splitlines()
     assert lines[2] == "pull 1 of 2: can be used, but:"
-    assert lines[5].split()[:2] == ["pull", "grasp"]
 
 
 def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
@@ -100,19 +86,6 @@ def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
         assert caution["cure"] and f"  - {caution['what']}: {caution['cure']}" in text.splitlines()
 
 
-def test_a_clock_ahead_is_shown_with_its_sign(tmp_path, params) -> None:
-    """Stamps of the pose that are 0.2 s too large."""
-
-    def ahead(stamp: int, message) -> None:
-        message.header = head(stamp + 200_000_000, message.header.frame_id)
-
-    path = blind_bag(tmp_path, change=edit(pose=ahead))
-    topics = look_at(path, params, band_of(params)).report["topics"]
-    offset = {row["role"]: row["clock_offset"] for row in topics if row["role"]}
-    assert offset["pose"] == pytest.approx(0.2, abs=0.001) and offset["wrench"] == 0
-    assert offset["depth"] == pytest.approx(-0.0155, abs=0.001)  # it takes a while
-
-
 def test_the_choice_of_topics_can_be_pasted(looked) -> None:
     """It is YAML as a band's settings hold it, also where one topic plays two roles."""
 
@@ -130,16 +103,6 @@ def test_the_choice_of_topics_can_be_pasted(looked) -> None:
     assert pasted(both)["pose"] == "/ft/wrench"
     odd = [row | {"topic": f"{row['topic']} #1: {{"} for row in topics]
     assert pasted(odd)["wrench"] == "/ft/wrench #1: {"
-
-
-def test_a_disk_that_is_full_is_one_line(seen, params, tmp_path, monkeypatch) -> None:
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: full())
-    with pytest.raises(UserError, match="out.png: cannot be written .No space left"):
-        checked(seen[0], params, band_of(params), sheet=tmp_path / "out.png")
-    assert not list(tmp_path.iterdir())
 
 
 def test_the_report_of_a_bad_recording(tmp_path, params) -> None:
@@ -212,8 +175,6 @@ def test_the_whole_command(fitted, tmp_path, monkeypatch) -> None:
     text, status = check_band(folder, {}, as_json=True)
     known = json.loads(text)["band"]
     assert known == content["band"] | {"source": "bands/toy/band.yaml"}
-    with pytest.raises(UserError, match=r"band.yaml has the band's sizes: leave these out"):
-        check_band(folder, {"mass": 0.04}, as_json=False)
 
 
 @pytest.mark.parametrize("name", MARKUP)

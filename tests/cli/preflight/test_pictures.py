@@ -1,12 +1,8 @@
 """The sheet, read back by others than those who wrote it."""
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 
-from sling2sim2real.cli.preflight.check import Look
-from sling2sim2real.cli.preflight.report import new_report
 from sling2sim2real.cli.preflight.sheet import MOMENTS, draw_sheet, masked_frames, moments
 
 
@@ -42,10 +38,3 @@ def test_a_refused_recording_shows_what_it_has(refused, params, tmp_path) -> Non
     message = draw_sheet(refused, params, tmp_path / "sheet.png")
     assert "all that can be shown" in message
     assert cv2.imread(str(tmp_path / "sheet.png")).shape[1] == 1600
-
-
-def test_nothing_to_show_is_said(params, tmp_path) -> None:
-    band = {"source": "given"}
-    look = Look(new_report(Path("x.mcap"), band) | {"problem": "no force"})
-    assert "nothing in the recording" in draw_sheet(look, params, tmp_path / "a.png")
-    assert not list(tmp_path.iterdir())

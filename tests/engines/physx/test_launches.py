@@ -110,54 +110,6 @@ def test_springs_throw_as_far_as_the_closed_form_says(
             assert done.hold_force[i] == pytest.approx(theta[0] * np.linalg.norm(draw))
 
 
-class Chain:
-    """Masses between springs and dampers, drawn straight, in steps of 10 us."""
-
-    COUNT, LENGTH, STIFFNESS, DAMPING, MASS = 24, 0.24, 70.0, 3e-3, 0.011
-
-    def __init__(self, drawn: float) -> None:
-        self.x, self.v = np.linspace(0, drawn, self.COUNT + 1), np.zeros(self.COUNT + 1)
-
-    def tension(self) -> np.ndarray:
-        each = np.diff(self.x) - self.LENGTH / self.COUNT + self.DAMPING * np.diff(self.v)
-        return self.STIFFNESS * self.COUNT * each
-
-    def advance(self, seconds: float, end_mass: float = np.inf) -> None:
-        pulls = np.array([np.inf, *[self.MASS / self.COUNT] * (self.COUNT - 1), end_mass])
-        for _ in range(round(seconds / 1e-5)):
-            self.v += 1e-5 * np.diff(self.tension(), prepend=0, append=0) / pulls
-            self.x += 1e-5 * self.v
-
-
-@pytest.mark.parametrize(("rate", "error"), [(200, 0.015), (1000, 0.0025)])
-def test_beside_a_band_with_mass_it_is_as_fast_as_within(
-    sling, launch_setup, tube, monkeypatch, rate, error
-):
-    """A chain that carries the projectile, and the same chain led by it, step after step."""
-    chain, led = (Chain(np.linalg.norm(DRAWS[0])) for _ in range(2))
-    seen = [np.diff(led.x)[-1]]
-
-    def force_on(tube, sections, nodes, young, poisson):
-        """Damped by what a whole step has changed: nothing before the first."""
-        place = nodes[0, sections[0]].mean(axis=0)
-        led.v[-1] = (np.linalg.norm(place) - led.x[-1]) * rate
-        if len(seen) > 1:
-            led.advance(1 / rate)
-        seen.append(np.diff(led.x)[-1])
-        change = (seen[-1] - seen[-2]) * rate * led.DAMPING
-        pull = seen[-1] - led.LENGTH / led.COUNT + change
-        return -led.STIFFNESS * led.COUNT * pull * place[None] / np.linalg.norm(place)
-
-    monkeypatch.setattr(launches, "force_on", force_on)
-    monkeypatch.setattr(launches, "GRAVITY", 0.0)
-    monkeypatch.setattr(launches, "STEPS_PER_S", rate)
-    flying = flown(sling, launch_setup, tube, THETAS[:1], DRAWS[:1])
-    mass = launches.Flight(sling, launch_setup, tube, THETAS[:1], DRAWS[:1]).mass
-    while chain.tension()[-1] > 0:
-        chain.advance(1e-5, mass)
-    assert flying.failure == [None] and flying.speed[0] == pytest.approx(-chain.v[-1], rel=error)
-
-
 def test_a_launch_that_does_not_land_says_why(sling, launch_setup, tube, springs):
     slack = np.array([[-0.12, -0.1]])
     assert flown(sling, launch_setup, tube, THETAS[:1], slack).failure == [SLACK]

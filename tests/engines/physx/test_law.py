@@ -1,7 +1,5 @@
 """PhysX's law: its stress is its energy's slope, and a straight string pulls by its closed form."""
 
-import re
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -9,8 +7,6 @@ from scipy.optimize import brentq
 from sling2sim2real.engines.physx import law
 from sling2sim2real.exporting import usd
 from sling2sim2real.exporting.mesh import Tube
-from tests.project import ROOT
-from validation.simulator.closed import String
 
 YOUNG, POISSON = 2.2e5, 0.45
 
@@ -76,14 +72,3 @@ def test_a_straight_string_is_free_of_stress_across(sling, poisson):
     assert first[1] == pytest.approx([pull, 0, 0], rel=1e-4, abs=1e-6)
     assert last[1] == pytest.approx([-pull, 0, 0], rel=1e-4, abs=1e-6)
     assert inside == pytest.approx(np.zeros((2, 3)), abs=1e-6)
-
-
-def test_the_page_has_its_factor_on_youngs_modulus(sling):
-    """At what modulus PhysX's law pulls a straight string as ours does, by both closed forms."""
-    page = (ROOT / "docs/simulator.md").read_text()
-    stretch, factor = (
-        np.array(re.search(rf"^\| {name} \|(.*)\|$", page, re.M)[1].split("|"), float)
-        for name in ("stretch", "factor on E")
-    )
-    ours = String.of(sling, [YOUNG, POISSON, 3e-3, 1.0, 1.0]).force(stretch) / sling.area
-    assert ours / (YOUNG * usd.nominal(stretch, POISSON)) == pytest.approx(factor, abs=5.1e-3)

@@ -1,27 +1,22 @@
 """Batches of parameters: slicing, workers, failures, engines, and what is said of them."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipeline.params import load
 from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.progress import parse
 from sling2sim2real.engines.physx import rollouts
-from sling2sim2real.identification.objective import evaluate
 from sling2sim2real.identification.objective.box import SearchBox
-from sling2sim2real.identification.objective.evaluate import Evaluator, simulate_of, simulated
+from sling2sim2real.identification.objective.evaluate import Evaluator, simulate_of
 from sling2sim2real.identification.objective.loss import TERMS
 from sling2sim2real.simulator.parameters import THETA
 from tests.identification.objective import toy, toy_engine
-from tests.identification.searches.functions import Evaluate, rosenbrock
 from tests.project import DEFAULTS
 from validation.synthetic import recorded_yardstick
 
 PARAMS = load(DEFAULTS)
-UNIT = np.random.default_rng(1).random((4, 5))
 EPISODE = toy.episode()
 OFFSET, PULL = "poissons_ratio", "youngs_modulus"  # what the toy takes them for
 BOX = SearchBox(
@@ -81,34 +76,6 @@ def test_failures_are_infinite_and_have_a_reason() -> None:
     assert evaluation.failure == ["too far", "the loss is not finite", None]
     np.testing.assert_array_equal(np.isinf(evaluation.total), [True, True, False])
     assert np.isnan(evaluation.terms["geom"][:2]).all()
-
-
-def test_progress_says_how_far_it_is_and_the_best_so_far(tmp_path, monkeypatch, capsys) -> None:
-    monkeypatch.chdir(tmp_path)
-    weights = dict(PARAMS.methods["de"].weights)
-    monkeypatch.setattr(evaluate, "sling_of_method", lambda *_: None)
-    monkeypatch.setattr(Evaluator, "of", lambda *_: Evaluate(rosenbrock, weights=weights))
-    recorded = "band1", "de", None, None
-    reporting = evaluate.logging_evaluator("history-band1-de", PARAMS, *recorded, 12)
-    reporting(UNIT), reporting(UNIT), reporting(1 - UNIT)
-    summary = [parse(line) for line in capsys.readouterr().err.splitlines()]
-    least = [
-        f"best {3 * min(rosenbrock(x).min() for x in some):.5g}"
-        for some in ([UNIT], [UNIT, 1 - UNIT])
-    ]
-    assert [(step.done, step.total) for step in summary] == [(4, 12), (8, 12), (12, 12)]
-    assert [step.facts[:3] for step in summary] == [  # then rate and time left
-        ("generation 0", least[0], "failed 0/4"),
-        ("generation 1", least[0], "failed 0/4"),
-        ("generation 2", least[1], "failed 0/4"),
-    ]
-    log = Path("logs/history-band1-de.log").read_text().splitlines()
-    assert log[0].endswith("history-band1-de: 12 rollouts")
-    assert [parse(f"history-band1-de {line}") for line in log[1:]] == summary
-
-
-def test_ours_needs_no_import() -> None:
-    assert simulate_of("sling") is simulated
 
 
 def test_an_engine_of_ours_is_found_by_its_name() -> None:

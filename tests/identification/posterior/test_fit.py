@@ -224,20 +224,6 @@ def test_priors_are_not_widened_by_what_recordings_disagree():
     )
 
 
-def test_no_step_is_longer_than_said(monkeypatch):
-    monkeypatch.setattr(module, "LONGEST_STEP", 1.0)
-    seen = curves(1)
-    fit(seen, space(), START)
-    moved = np.abs(np.diff(seen[0].requested[:4], axis=0)) / SIZE
-    assert moved.max() == pytest.approx(1.0)
-
-
-def test_progress_tells_of_each_nearer_expansion():
-    summary = []
-    result = fit(curves(1), space(), START, progress=summary.append)
-    assert summary[-1].misfit == result.misfit and summary[0].misfit > 10 * result.misfit
-
-
 def test_finite_differences_stay_within_the_upper_bounds():
     box = space(high=(8.0, 50.0, 50.0))
     assert np.all(box.differences(box.high) == -SIZE)

@@ -10,15 +10,6 @@ def random_search(evaluate, dimension: int, *, rollouts: int, seed: int, populat
         assert np.isfinite(evaluate(rng.random((batch, dimension)))).all()
 
 
-def stubborn(evaluate, dimension: int, *, rollouts: int, seed: int, population: int):
-    """Goes on whatever is raised, and ends by itself."""
-    for _ in range(100):
-        try:
-            evaluate(np.full((7, dimension), 0.5))
-        except Exception:
-            continue
-
-
 def outside(evaluate, dimension: int, **settings):
     evaluate(np.full((7, dimension), 1.5))
 

@@ -18,14 +18,6 @@ MATRIX = correlated()
 value = quadratic(CENTRE, MATRIX).function
 
 
-def test_its_differences_stay_in_the_cube_and_lie_beside_the_point() -> None:
-    """Also at its faces, where the minimum of this loss is."""
-    for batch in batches_of(adam, lambda unit: unit.sum(axis=1), D, 300, population=6)[1:]:
-        assert batch.min() >= 0 and batch.max() <= 1
-        np.testing.assert_allclose(np.abs(batch[1:] - batch[0]), 0.003 * np.eye(D), atol=1e-12)
-    assert batch[0].max() < 0.01
-
-
 def test_its_steps_are_torchs() -> None:
     """On a linear loss, whose differences are exact, with the rate that falls along a cosine."""
     slope = np.array([3.0, -1.0, 0.5, 2.0, -0.1])

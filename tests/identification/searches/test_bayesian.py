@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import norm
 
-from sling2sim2real.identification.searches.bo import greedy, standardised, training_rows
+from sling2sim2real.identification.searches.bo import greedy, standardised
 from tests.identification.searches.functions import (
     CENTRE,
     NAMES,
@@ -103,9 +103,3 @@ def test_neither_units_nor_the_size_of_an_outlier_matter(loss, outlier: float) -
     assert summary.std(ddof=1) == pytest.approx(1) or np.ptp(summary) < 1e-9
     loss = np.random.default_rng(1).lognormal(0, 3, 50)
     np.testing.assert_allclose(standardised(7 * loss - 3), standardised(loss), atol=1e-12)
-
-
-def test_the_process_sees_the_best_and_the_latest() -> None:
-    loss = np.array([5.0, 1.0, 9.0, 2.0, 8.0, 7.0, 6.0])
-    assert training_rows(loss, 7).tolist() == list(range(7))
-    assert training_rows(loss, 4).tolist() == [1, 3, 5, 6]

@@ -12,14 +12,11 @@ from hypothesis.extra.numpy import arrays
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.identification.searches import regions as module
 from sling2sim2real.identification.searches.regions import (
-    Region,
     find_regions,
     isotropic,
     regularised,
     suppress,
 )
-
-NAMES = ("a", "b", "c", "d", "e")
 
 COARSE = st.sampled_from([0.0, 0.05, 0.3, 0.5, 1.0])  # so that points coincide
 
@@ -59,16 +56,6 @@ def test_covariance_is_that_of_the_nearest_successes() -> None:
         assert not set(region.members) & {len(unit) - 1, len(unit) - 2}
         expected = factor @ factor.T
         np.testing.assert_allclose(region.sigma, expected, atol=0.06 * expected.max())
-
-
-def test_regions_survive_the_file(tmp_path) -> None:
-    region = Region(np.full(5, 0.1), np.eye(5) / 3, 1.25, [3, 1])
-    module.save_regions(tmp_path / "a.json", NAMES, [region])
-    (loaded,), names = module.load_regions(tmp_path / "a.json")
-    assert names == list(NAMES)
-    np.testing.assert_array_equal(loaded.mu, region.mu)
-    np.testing.assert_array_equal(loaded.sigma, region.sigma)
-    assert (loaded.loss, loaded.members) == (1.25, [3, 1])
 
 
 @given(seed=st.integers(0, 10**6), dimension=st.integers(2, 8))

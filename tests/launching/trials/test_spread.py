@@ -62,12 +62,6 @@ def test_a_shortest_interval_and_a_kernel_are_those_of_the_normal() -> None:
     assert np.hypot(inner.std(), kernel) == pytest.approx(values[::20].std())
 
 
-def test_an_exact_draw_of_a_known_band_has_no_width() -> None:
-    landing = toy.launch(DRAWS).landing_y
-    none = landing_intervals(launcher, DRAWS, None, 0.0)
-    np.testing.assert_allclose(none, np.stack([landing, landing], axis=1))
-
-
 def test_failures_of_the_few_are_left_out_and_of_the_many_are_none() -> None:
     def fragile(share: float):
         def launch(draws, thetas=None):

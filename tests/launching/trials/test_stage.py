@@ -5,9 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from ruamel.yaml import YAML
 
-from sling2sim2real.base.errors import UserError
 from sling2sim2real.base.files import write_text
 from tests.report.conftest import BAND, METHOD
 from tests.report.conftest import root as root  # noqa: PLC0414
@@ -52,37 +50,3 @@ def test_measured_launches_take_their_place(tried) -> None:
     assert rows.failure.fillna("").tolist() == ["", "did not land", ""]
     assert rows.predicted_y[0] == rows.predicted_y[1] != rows.predicted_y[2]
     assert rows.hold_force.gt(0).all()
-
-
-def test_landings_of_other_methods_leave_the_policys_own(tried) -> None:
-    rows = tried(f"{HEAD}\n-0.30,-0.17,2.2,check,1.925,package_si\n")
-    assert rows.kind.tolist() == ["predicted"] * 3
-
-
-def test_a_launch_that_none_is_stops_the_stage_and_leaves_what_was_there(tried) -> None:
-    before = Path("data/trials", f"{BAND}-{METHOD}.parquet").read_bytes()
-    with pytest.raises(UserError, match="line 2: use must be fit or check"):
-        tried(f"{HEAD}\n-0.30,-0.17,2.2,score,1.925,\n")
-    assert Path("data/trials", f"{BAND}-{METHOD}.parquet").read_bytes() == before
-
-
-@pytest.mark.slow
-def test_a_rig_band_is_launched_and_measured_launches_stand_apart(tried) -> None:
-    yaml = YAML()
-    content = yaml.load(Path("params.yaml"))
-    content["run"]["rig"] = content["run"]["recordings"]
-    content["bands"][BAND]["source"] = "rig"
-    content["rig"]["bands"][BAND] = content["rig"]["bands"]["band1"]
-    content["rig"].update(edges=20, tolerance=1e-4)
-    content["trials"].update(targets=[1.725, 1.925], repeats=2)
-    yaml.dump(content, Path("params.yaml"))
-    rows = tried(f"{HEAD}\n-0.30,-0.17,2.2,check,1.925,{METHOD}\n")
-    assert rows.kind.tolist() == ["virtual"] * 4 + ["measured"]
-    virtual = rows[:4]
-    assert virtual.hold_force.nunique() == 4  # each trial has errors of its own
-    for row in virtual.itertuples():
-        assert row.flight_z[-1] == pytest.approx(-0.52)
-        assert (row.failure is None) == (1.425 <= row.flight_y[-1] <= 2.425)
-        assert row.landing_y == row.flight_y[-1]  # where it counts as failed, too
-    assert virtual.failure.str.startswith("beyond the area: lands at").all()
-    assert rows.flight_y[4] is None and rows.landing_y[4] == 2.2

@@ -3,7 +3,6 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from pipeline.params import load
 from sling2sim2real.launching.trials import trials as module
@@ -70,16 +69,6 @@ def test_a_table_holds_what_is_known_and_nothing_else(monkeypatch) -> None:
     assert rows["flight_z"] == [[-0.03, 0.2, -0.52], [-0.03, 0.2], None]
 
 
-def test_launches_of_a_policy_and_measured_ones_stand_in_one_table(monkeypatch) -> None:
-    trials = trials_of("predicted", "predicted", "measured")
-    trials[2] |= {"target": None, "landing_y": 2.2}
-    rows = made(trials, monkeypatch)
-    assert rows["kind"] == ["predicted", "predicted", "measured"]
-    assert rows["target"] == [1.9, 1.9, None]
-    assert rows["hold_force"] == [9.0, None, 31.0]  # as predicted
-    assert rows["landing_y"] == [None, None, 2.2] and rows["flight_y"] == [None] * 3
-
-
 class InProcess:
     """In the place of a pool: here, one after the other."""
 
@@ -108,27 +97,3 @@ def test_the_limit_is_the_simulators_own() -> None:
     assert result.failure == expected.failure and result.failure[0] is None
     for name in ("landing_y", "speed", "angle", "separation_y", "separation_z", "hold_force"):
         np.testing.assert_array_equal(getattr(result, name), getattr(expected, name))
-
-
-LANDINGS = (1.9, 3.0, float("nan"))  # within the area, beyond it, nowhere
-
-
-def landed(draw: np.ndarray, number: int) -> SimpleNamespace:
-    landing = LANDINGS[number]
-    return SimpleNamespace(
-        landing_y=landing,
-        failure=None if landing == 1.9 else "failed",
-        hold_force=1e3 * abs(draw[0]) + number,
-        flight=None,
-    )
-
-
-@pytest.mark.slow
-def test_landings_outside_the_area_stand_beside_their_failure() -> None:
-    trials = trials_of(*3 * ["predicted"])
-    done = launch_virtually(trials, landed)
-    assert [(trial["kind"], trial["target"]) for trial in done] == [("virtual", 1.9)] * 3
-    assert [trial["landing_y"] for trial in done][:2] == [1.9, 3.0]
-    assert np.isnan(done[2]["landing_y"])
-    assert [trial["failure"] for trial in done] == [None, "failed", "failed"]
-    assert [trial["hold_force"] for trial in done] == pytest.approx([300, 311, 322])

@@ -1,10 +1,6 @@
 import numpy as np
-import pytest
 
-from pipeline.report.data import Floor
 from rig.oracle.floor import errors_of, trial_numbers
-from sling2sim2real.base.errors import UserError
-from sling2sim2real.base.schema import read_json
 
 
 def test_numbers_begin_with_the_trials_own(params) -> None:
@@ -36,12 +32,3 @@ def test_a_floor_counts_what_failed_and_averages_the_rest(params) -> None:
     none = errors_of(draws * np.nan, np.full(misses.shape, np.nan), params)
     assert none["mean_error_m"] is None and none["failed"] == none["launches"]
     assert [row["draw"] for row in none["targets"].values()] == [None] * len(targets)
-
-
-def test_a_floor_that_is_missing_or_damaged_is_named(tmp_path) -> None:
-    path = tmp_path / "band1.json"
-    for broken in (None, "", "[]", "{}", '{"targets": {"1.725": {}}}'):
-        if broken is not None:
-            path.write_text(broken)
-        with pytest.raises(UserError, match="band1.json: "):
-            read_json(path, Floor)

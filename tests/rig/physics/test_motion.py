@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.params import Params
-from rig.physics.motion import OPEN, PULL, PULLED, HandMotion
+from rig.physics.motion import OPEN, PULLED, HandMotion
 from rig.physics.world import string_of
 from rig.recorder.interaction import hang, pull_and_release
 from sling2sim2real.base.errors import UserError
@@ -13,7 +13,6 @@ from tests.project import with_
 
 HALFWAY = Dip(at=0.5, depth=0.05, out_time=0.25, back_time=0.5)
 TWICE = (Dip(at=1.0, depth=0.1, out_time=1.0, back_time=1.5), HALFWAY)
-DRAW = (-0.30, -0.15)
 
 
 def motion_of(*dips: Dip) -> HandMotion:
@@ -23,21 +22,6 @@ def motion_of(*dips: Dip) -> HandMotion:
 
 def deep(dip: Dip, depth: float) -> Dip:
     return dip.model_copy(update={"depth": depth})
-
-
-def drawn_by(motion: HandMotion, *times: float) -> np.ndarray:
-    """How far from the fork [m]."""
-    return -motion.position(np.array(times))[:, 1]
-
-
-def test_a_dip_leads_back_and_forth_where_it_says() -> None:
-    """The pull's own legs take 4 s together; the earlier dip comes first, in whatever order."""
-    motion = motion_of(*TWICE)
-    ends = PULL + np.cumsum([0.0, 2.0, 0.25, 0.5, 2.0, 1.0, 1.5])
-    np.testing.assert_allclose(drawn_by(motion, *ends), [0, 0.2, 0.15, 0.2, 0.4, 0.3, 0.4])
-    assert np.abs(motion.position(ends, 1)).max() < 1e-12  # each leg begins and ends at rest
-    middle = (ends[1:] + ends[:-1]) / 2
-    np.testing.assert_allclose(drawn_by(motion, *middle), [0.1, 0.175, 0.175, 0.3, 0.35, 0.35])
 
 
 def test_all_that_follows_is_later_by_the_dips() -> None:
@@ -51,12 +35,6 @@ def test_all_that_follows_is_later_by_the_dips() -> None:
         opening = np.linspace(OPEN - 0.01, OPEN + 0.2, 50)
         values = getattr(dipped, state)(opening + late)
         np.testing.assert_allclose(values, getattr(plain, state)(opening), atol=1e-9)
-
-
-def test_dips_at_one_place_come_as_they_are_given() -> None:
-    motion = motion_of(HALFWAY, deep(HALFWAY, 0.1))
-    ends = PULL + 2.0 + np.cumsum([0.25, 0.5, 0.25, 0.5, 2.0])
-    np.testing.assert_allclose(drawn_by(motion, *ends), [0.15, 0.2, 0.1, 0.2, 0.4])
 
 
 def test_a_dip_beyond_the_fork_is_refused() -> None:

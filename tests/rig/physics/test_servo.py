@@ -30,30 +30,11 @@ def test_it_swings_back_like_an_oscillator(motion: HandMotion) -> None:
     np.testing.assert_allclose(states[:, :3] - place, shape * offset, atol=1e-8)
 
 
-def test_without_a_load_it_stays_on_a_path_that_moves(motion: HandMotion) -> None:
-    follow, times = Servo(MASS, STIFFNESS, DAMPING, motion.path), np.linspace(2.5, 5.5, 40)
-    start = np.concatenate([motion.position(2.5), motion.position(2.5, 1)])
-    states = follow.alone(start, times, 1e-9)
-    np.testing.assert_allclose(states[:, :3], motion.position(times), atol=1e-7)
-    np.testing.assert_allclose(states[:, 3:], motion.position(times, 1), atol=1e-6)
-
-
 def test_a_steady_load_pushes_it_aside_by_its_stiffness(motion: HandMotion) -> None:
     follow = Servo(MASS, STIFFNESS, DAMPING, motion.path)
     load, times = np.array([[0.0, 12.0, -1.0]]), np.array([7.0])
     aside = np.hstack([motion.position(times) + load / STIFFNESS, np.zeros((1, 3))])
     np.testing.assert_allclose(follow.acceleration(times, aside, load), 0, atol=1e-9)
-
-
-def test_the_path_moves_as_it_says() -> None:
-    """Velocity and acceleration are the derivatives of the place, wander and all."""
-    rng, nudge = np.random.default_rng(0), 1e-5
-    motion = HandMotion.through(np.array([0.0, 0.0, -0.2]), 1e-3, (0.004, 1.0), rng)
-    times = np.linspace(0.06, 9.94, 67)
-    for order in (0, 1):
-        ahead, behind = (motion.position(times + step, order) for step in (nudge, -nudge))
-        difference = (ahead - behind) / (2 * nudge)
-        np.testing.assert_allclose(difference, motion.position(times, order + 1), atol=1e-6)
 
 
 def test_damping_ratio(params: Params, motion: HandMotion) -> None:

@@ -2,13 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from pipeline.params import Params
-from rig.physics.scene import Mesh, tube
+from rig.physics.scene import tube
 from rig.recorder.camera import (
-    AMBIENT,
-    LIGHT,
     Exposure,
     VirtualCamera,
     blurred,
@@ -41,22 +38,6 @@ def test_a_window_sees_what_all_rays_see(camera: VirtualCamera) -> None:
     everywhere = np.isfinite(camera.see(mesh).depth)
     np.testing.assert_array_equal(seen, everywhere)
     assert not everywhere[: rows.start].any() and not everywhere[:, columns.stop :].any()
-
-
-@pytest.mark.parametrize("angle", [0.0, 0.5, 1.0, 1.5])
-def test_light_is_lamberts(angle: float) -> None:
-    """A plane turned away from the light by an angle."""
-    side = np.cross(LIGHT, [0.0, 0.0, 1.0])
-    normal = Rotation.from_rotvec(angle * side / np.linalg.norm(side)).apply(LIGHT)
-    across = np.cross(normal, [0.0, 0.0, 1.0])
-    corners = np.array([across, np.cross(normal, across), -across])
-    mesh = Mesh(corners, np.array([[0, 1, 2]]), np.array([[0.8, 0.5, 0.1]]))
-    seen = VirtualCamera.looking(
-        0.7 * normal + corners.mean(axis=0), corners.mean(axis=0), 495.0, 0.1
-    )
-    color = seen.see(mesh).color[24, 32]
-    bright = AMBIENT + (1 - AMBIENT) * max(np.cos(angle), 0)
-    np.testing.assert_allclose(color, bright * np.array([0.8, 0.5, 0.1]), rtol=1e-4)
 
 
 def test_a_fast_band_is_smeared_and_loses_depth(camera: VirtualCamera, params: Params) -> None:

@@ -8,7 +8,7 @@ from rig.physics import launch as launches
 from rig.physics.motion import OPEN, HandMotion
 from rig.physics.robot import SENSOR_LEVER, Robot
 from rig.physics.world import bent_at, string_of
-from rig.recorder.camera import Exposure, VirtualCamera, measured_depth
+from rig.recorder.camera import Exposure, VirtualCamera, exposed, measured_depth
 from rig.recorder.interaction import Interaction
 from rig.recorder.record import radius
 from rig.recorder.sensors import TOOL_CENTER, wrench
@@ -39,7 +39,7 @@ def test_wrench(params: Params) -> None:
     np.testing.assert_allclose(noise.std(axis=0), settings.noise, rtol=0.03)
 
 
-def test_depth(params: Params) -> None:
+def test_depth_and_colour(params: Params) -> None:
     """Noise of a wall grows with its distance squared; pixels drop out; beyond a range is none."""
     settings, rng = params.rig.camera, np.random.default_rng(0)
     for distance in (1.0, 2.0):
@@ -50,6 +50,8 @@ def test_depth(params: Params) -> None:
         assert np.isclose(there.std(), deviation, rtol=0.02)
         assert np.isclose(there.mean(), distance, atol=1e-4)
         assert np.isclose((depth == 0).mean(), settings.dropout, rtol=0.15)
+    grey = exposed(np.full((480, 640, 3), 0.5), settings, rng)
+    assert np.isclose(grey.std(), np.hypot(settings.color_noise, 1 / np.sqrt(12)), rtol=0.02)
     flat = np.full((480, 640), 1.01 * settings.range, np.float32)
     beyond = Exposure(np.zeros((480, 640, 3)), flat, flat, flat)
     assert not measured_depth(beyond, settings, rng).any()

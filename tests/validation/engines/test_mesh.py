@@ -1,13 +1,9 @@
 """The band as other engines take it, its force, and the comparison where MuJoCo is missing."""
 
-import sys
-
 import numpy as np
 import pytest
 
-from sling2sim2real.base.errors import UserError
 from sling2sim2real.exporting.mesh import CLAMPED_LENGTH_M, Tube
-from validation.engines import checks
 from validation.simulator.closed import String
 
 THETA = np.array([2.2e5, 0.45, 3e-3, 1.0, 1.0])
@@ -63,9 +59,3 @@ def test_its_force_is_the_closed_form_of_a_straight_string(sling, rings):
     ends = force.sum(axis=1)
     assert ends[[0, -1]] == pytest.approx(np.array([[pull, 0, 0], [-pull, 0, 0]]), abs=1e-9)
     assert force[1:-1] == pytest.approx(np.zeros(force[1:-1].shape), abs=1e-9)
-
-
-def test_without_mujoco_the_section_says_how_to_get_it(bench, monkeypatch):
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(UserError, match="make setup"):
-        checks.section(bench)

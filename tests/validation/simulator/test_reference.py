@@ -5,16 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from sling2sim2real.simulator.initial import hanging_guess
 from sling2sim2real.simulator.parameters import Parameters
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 from validation.simulator.closed import String
 from validation.simulator.experiment import band_of
-from validation.simulator.march import jacobian
 from validation.simulator.reference import ReferenceRod
 
-THETA = Parameters.of(NEO_HOOKEAN, [5e5, 0.42, 3e-3, 0.5, 0.6])
+FIVE = (5e5, 0.42, 3e-3, 0.5, 0.6)
+THETA = Parameters.of(NEO_HOOKEAN, FIVE)
 
 
 def rough(sling) -> np.ndarray:
@@ -51,17 +52,23 @@ def test_viscous_force_is_the_rate_of_the_elastic_force(bench):
     assert np.abs(viscous - tangent).max() < 1e-6 * np.abs(tangent).max()
 
 
-def test_jacobian_is_the_residuals_slope(bench):
-    rod = ReferenceRod(band_of(bench), THETA)
-    sections = rough(rod.sling)
-
-    def residual(x):
-        return rod.internal(x, x - sections, sections)
-
-    slope = jacobian(residual, sections)
-    rng = np.random.default_rng(2)
-    rate = rng.normal(size=sections.shape)
-    step = 1e-7
-    expected = (residual(sections + step * rate) - residual(sections - step * rate)) / (2 * step)
-    product = np.einsum("ijkl,kl->ij", slope, rate)
-    assert np.abs(product - expected).max() < 1e-6 * np.abs(expected).max()
+@pytest.mark.parametrize("seed", range(3))
+def test_a_stretch_is_braked_whatever_brakes_turns(bench, seed):
+    """Rates along the principal axes, in any state."""
+    rng = np.random.default_rng(seed)
+    turn, stretches = Rotation.random(random_state=seed).as_matrix(), rng.uniform(0.7, 2.0, 3)
+    rates = rng.normal(size=3)
+    forces = []
+    for share in (0.0, 0.5, 1.0):
+        sling = band_of(bench)
+        rod = ReferenceRod(sling, Parameters.of(NEO_HOOKEAN, FIVE, turn_damping=share))
+        at, rate = np.zeros((2, sling.sections, 9))
+        for state, size in ((at, stretches), (rate, rates)):
+            columns = size[:, None] * turn  # F = R diag: columns k of F lie in its rows
+            state[:, :3] = rod.sling.arc[:, None] * columns[0]
+            state[:, 3:] = columns[1:].ravel()
+        forces.append(rod.viscous_stress(rate, at))
+    size = np.abs(forces[-1]).max()
+    assert size > 0
+    for force in forces[:-1]:
+        np.testing.assert_allclose(force, forces[-1], atol=1e-12 * size)

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from sling2sim2real.base.errors import UserError
-from validation.simulator import verification as report
+from validation import verify as report
 from validation.simulator.finding import Measure, Theme, off
 
 KEPT = Measure("pull", "closed form", 0.2, "%", 0.5, "16 pairs")

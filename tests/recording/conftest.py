@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +11,13 @@ from PIL import Image
 
 from pipeline.params import Params, load
 from sling2sim2real.episode.episode import Episode
+from sling2sim2real.recording import checks
 from sling2sim2real.recording.build import Processed, Whole, episode_of, process_recording
+from sling2sim2real.recording.checks import Finding
 from sling2sim2real.recording.events import Part, Pull
 from sling2sim2real.recording.frames import geometry_of
 from sling2sim2real.recording.mask import RidgeMask
+from sling2sim2real.recording.signals import signals_of
 from sling2sim2real.recording.streams import Recording, read_recording
 from tests import once
 from tests.project import DEFAULTS, with_
@@ -109,3 +114,45 @@ def written(factory: pytest.TempPathFactory, name: str, **options) -> tuple[Path
 @pytest.fixture(scope="session")
 def whole(blind) -> Path:
     return blind[0]
+
+
+# Sound recordings, changed in one thing, and what the checks find in them.
+
+BAND = "band1"
+
+
+def with_recording(done: Whole, **changes) -> Part:
+    """With other streams or words."""
+    pull = done.pull
+    return Part(replace(pull.recording, **changes), pull.geometry, pull.number, pull.count)
+
+
+def with_facts(done: Whole, **facts) -> Whole:
+    """With other `SignalFacts`."""
+    signals = replace(done.signals, facts=replace(done.signals.facts, **facts))
+    return replace(done, signals=signals)
+
+
+def with_force(done: Whole, change, params: Params) -> Whole:
+    """With `change(times, values)` of the raw force, from the events on. Raises UserError."""
+    wrench = done.pull.recording.wrench
+    values = change(done.pull.force_time, wrench.values)
+    pull = Pull.of(with_recording(done, wrench=replace(wrench, values=values)))
+    signals = signals_of(pull, params, done.delays.tool_inertia)
+    return replace(done, pull=pull, signals=signals, scene=replace(done.scene, signals=signals))
+
+
+def of_signals(done: Whole, params: Params) -> list[Finding]:
+    band = params.bands[BAND]
+    scene = replace(done.scene, signals=done.signals)
+    return [
+        *checks.of_signals(done.pull, done.delays, done.signals, scene, band, params, weighed=True)
+    ]
+
+
+def of_pictures(done: Whole, taut: float | None = 1.0) -> list[Finding]:
+    return [*checks.of_pictures(done.scene, done.clouds, done.coverage, (taut, 0.0))]
+
+
+def abouts(findings: Iterable[Finding]) -> set[str]:
+    return {finding.about for finding in findings}

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import struct
-from dataclasses import replace
 from pathlib import Path
 
 from validation.recordings.bag import messages_of, write_again
-
-STAMP = struct.Struct("<iI")  # header.stamp, behind the four bytes that begin a CDR message
+from validation.recordings.streams import FRAMES, Bag
 
 
 def joined(path: Path, recordings: list[Path], gap: float = 0.01) -> list[float]:
@@ -19,24 +16,22 @@ def joined(path: Path, recordings: list[Path], gap: float = 0.01) -> list[float]
     Returns:
         By how much each was moved [s].
     """
-    moved, together, end = [], [], 0
+    moved, together, end = [], Bag(), 0
     for recording in recordings:
-        messages = messages_of(recording)
-        first = min(message.log_time for *_, message in messages)
-        shift = end + round(gap * 1e9) - first if moved else 0
-        for schema, channel, message in messages:
-            data, received = message.data, message.log_time + shift
-            if channel.topic != "/tf_static":
-                seconds, nanoseconds = STAMP.unpack_from(data, 4)
-                stamp = divmod(seconds * 10**9 + nanoseconds + shift, 10**9)
-                data = data[:4] + STAMP.pack(*stamp) + data[4 + STAMP.size :]
-            elif moved:
-                continue
-            shifted = replace(message, data=data, log_time=received, publish_time=received)
-            together.append((schema, channel, shifted))
+        messages = Bag.read(recording).messages
+        logs = [message.log for message in messages]
+        shift = end + round(gap * 1e9) - min(logs) if moved else 0
+        for message in messages:
+            if message.type.endswith(FRAMES):
+                if moved:
+                    continue
+            else:
+                message.stamp += shift
+            message.log += shift
+            together.messages.append(message)
         moved.append(shift * 1e-9)
-        end = max(message.log_time for *_, message in messages) + shift
-    write_again(together, path)
+        end = max(logs) + shift
+    together.write(path)
     return moved
 
 

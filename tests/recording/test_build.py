@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from sling2sim2real.base.errors import UserError
 from sling2sim2real.episode.episode import Episode
@@ -13,7 +14,7 @@ from sling2sim2real.recording.build import build_episodes
 from sling2sim2real.recording.signals import signals_of
 from tests.project import with_
 from tests.recording.conftest import processed_of, pull_of
-from validation.recordings.bag import EYE, Truth, blind_bag, edit, scores
+from validation.recordings.bag import EYE, RADIUS, Truth, blind_bag, edit
 
 
 def signals(path, params):
@@ -41,12 +42,14 @@ def test_events(episode, seen) -> None:
     assert episode.opening[0] == pytest.approx(0.08) and episode.opening[60] == pytest.approx(0.016)
 
 
-def test_clouds_lie_on_the_band_and_cover_it(episode, seen) -> None:
+def test_clouds_lie_on_the_band_and_cover_it(episode, checked, seen) -> None:
     assert len(episode.clouds) == 54
-    off, covered = scores(episode, seen[1])
-    assert np.median(np.abs(off)) <= 0.003
-    assert np.mean(off < 0.02) > 0.95
-    assert covered >= 0.9
+    lines = [seen[1].center_line(time) for time in episode.cloud_time]
+    off = np.concatenate(
+        [cKDTree(line).query(cloud)[0] for line, cloud in zip(lines, episode.clouds, strict=True)]
+    )
+    assert np.median(np.abs(off - RADIUS)) <= 0.003 and np.mean(off < 0.025) > 0.95
+    assert checked.taut_coverage[0] >= 0.9
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from sling2sim2real.recording.clouds import by_phase, over_time, share_covered, 
 from sling2sim2real.recording.images import depth
 from sling2sim2real.recording.messages import Picture
 from sling2sim2real.settings.recording import CloudParams
-from tests.recording.made import of_pictures
+from tests.recording.conftest import of_pictures
 from validation.recordings import looks
 from validation.recordings.looks import BAND, LOOKS
 

@@ -8,13 +8,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sling2sim2real.recording import delays
+from sling2sim2real.recording import delays, images
 from sling2sim2real.recording.camera_delay import camera_delay
+from sling2sim2real.recording.checks import of_release
 from sling2sim2real.recording.delays import Estimate, correct_delays
 from sling2sim2real.recording.events import Part, Pull
 from sling2sim2real.recording.force import ToolInertia, estimate_tool_inertia
 from sling2sim2real.recording.frames import geometry_of
-from sling2sim2real.recording.release_pictures import ReleasePictures
+from sling2sim2real.recording.messages import Picture
+from sling2sim2real.recording.release_pictures import ReleasePictures, release_pictures
+from sling2sim2real.recording.start_back import start_back
 from sling2sim2real.recording.streams import read_recording
 from tests.project import with_
 from tests.recording.conftest import pull_of
@@ -270,3 +273,133 @@ def test_a_hand_and_a_band_that_disagree_are_left_and_said(looked_at, params, mo
     assert "but the band is let go +200" in estimates.conflict
     assert not estimates.camera.applied and estimates.camera.left == pytest.approx(0.24, rel=0.01)
     np.testing.assert_array_equal(right.recording.depth.stamp, recording.depth.stamp)
+
+
+RELEASE = 3.0
+TIME = np.arange(0.0, 4.0, 0.002)
+
+
+def handed(away: np.ndarray) -> SimpleNamespace:
+    """A hand 0.4 m behind the fork that is `away` (S,) from there at TIME [m]."""
+    path = np.stack([0 * away, -0.4 - away, 0 * away], axis=1)
+    motion = SimpleNamespace(
+        time=TIME, path=path, period=0.002, position=lambda time: np.array([0.0, -0.4, 0.0])
+    )
+    release = SimpleNamespace(time=RELEASE, fall=0.0007, resolution=0.001)
+    return SimpleNamespace(release=release, motion=motion)
+
+
+def swing(begin: float) -> np.ndarray:
+    """A 5 kg arm on 12 kN/m, which 15 N let go; half its critical damping [m]."""
+    since, rate = np.clip(TIME - begin, 0, None), np.sqrt(12000 / 5)
+    turn = rate * np.sqrt(0.75)
+    rest = np.cos(turn * since) + 0.5 / np.sqrt(0.75) * np.sin(turn * since)
+    return 15 / 12000 * (1 - np.exp(-0.5 * rate * since) * rest)
+
+
+def retreat(begin: float) -> np.ndarray:
+    return 0.13 * np.clip(TIME - begin, 0, None)
+
+
+@pytest.mark.parametrize("moves", [swing, retreat])
+@pytest.mark.parametrize("late", [-0.03, -0.005, 0.0, 0.012, 0.03])
+def test_the_poses_delay_is_found_with_a_true_error(moves, late) -> None:
+    off, errors = [], []
+    for seed in range(8):
+        shaken = np.random.default_rng(seed).normal(0, 4e-6, len(TIME))
+        value, error = start_back(handed(moves(RELEASE + late) + shaken))
+        off.append(value - late)
+        errors.append(error)
+    assert np.abs(off).max() < 0.002
+    assert np.sqrt(np.mean((np.array(off) / errors) ** 2)) < 1.5
+
+
+def test_a_hand_that_rests_or_wanders_says_nothing() -> None:
+    random = np.random.default_rng(1)
+    assert start_back(handed(random.normal(0, 2e-5, len(TIME)))) is None
+    assert start_back(handed(1e-4 * np.sin(2 * TIME))) is None
+    assert start_back(handed(retreat(RELEASE + 0.5))) is None
+    assert start_back(handed(-retreat(RELEASE))) is None  # towards the fork
+
+
+SOUND = ReleasePictures(-0.03, 0.02, -0.015, 0.02, (), ())
+
+
+@pytest.fixture(scope="module")
+def pull(seen, params) -> Pull:
+    return pull_of(seen[0], params)
+
+
+@pytest.mark.parametrize("late", [-0.2, -0.06, 0.0, 0.06, 0.2])
+def test_the_delay_is_between_both_ends(pull, params, late) -> None:
+    pictures = release_pictures(pull.shifted(camera=-late), params.setup.fork_width)
+    assert pictures.earliest <= late <= pictures.latest
+    assert pictures.latest - pictures.earliest < 1.3 * pull.recording.depth.period + 0.02
+    if abs(late) < 0.001:
+        assert pictures.beyond == 0
+        assert not list(of_release(replace(pictures, repeated=())))
+    if abs(late) > 0.1:
+        assert pictures.beyond > 0
+        assert [finding.about for finding in of_release(pictures)][-1:] == ["release_pictures"]
+
+
+def test_what_the_pictures_show_goes_before_the_hand(pull, params) -> None:
+    """A camera that is 0.2 s late is nearly right after the correction, or said to be unclear."""
+    moved, estimates = correct_delays(pull.shifted(camera=-0.2), params)
+    left = (moved.recording.depth.stamp - pull.recording.depth.stamp) * 1e-9
+    assert abs(left).max() < 3 * (estimates.camera.left or 0.0) + 1e-9
+    assert estimates.camera.applied
+
+
+def test_black_pictures_show_nothing(blind, params) -> None:
+    dark = pull_of(blind[0], params)
+    assert release_pictures(dark, params.setup.fork_width) is None
+
+
+@pytest.mark.fires("release_pictures")
+def test_old_pictures_over_the_release_are_refused() -> None:
+    held = replace(SOUND, repeated=(-0.2, -0.1, -0.015))  # of a scene without noise
+    assert not list(of_release(held))
+    for odd in (
+        replace(SOUND, repeated=(0.053,)),
+        replace(SOUND, repeated=(0.01,)),
+        replace(SOUND, drawn=0.2, gone=0.23, earliest=0.18, latest=0.23, repeated=(0.1, 0.2)),
+    ):
+        (message,) = of_release(odd)
+        assert message.about == "release_pictures" and message.refused
+
+
+def test_pictures_without_depth_or_in_disorder_make_no_delay_up(pull, params) -> None:
+    """Of an emitter that is switched on and off every second one is empty."""
+    depth = pull.recording.depth
+    nothing = np.zeros_like(images.depth(depth.values[0]))
+    blank = Picture("32FC1", "", nothing.view(np.uint8).ravel(), *nothing.shape, nothing.strides[0])
+    values = [blank if k % 2 else picture for k, picture in enumerate(depth.values)]
+    flickers = replace(pull.recording, depth=replace(depth, values=values))
+    pictures = release_pictures(replace(pull, recording=flickers), params.setup.fork_width)
+    assert pictures.earliest <= 0 <= pictures.latest and not pictures.again
+    assert replace(SOUND, drawn=-0.3, gone=-0.27, latest=-0.27, again=(-0.2,)).beyond == 0
+
+
+def test_a_band_that_is_never_let_go_is_refused(pull, params) -> None:
+    depth = pull.recording.depth
+    since = depth.seconds(pull.recording.origin) - pull.release.time
+    held = depth.values[int(np.searchsorted(since, -0.1))]
+    values = [
+        held if time > -0.1 else picture for time, picture in zip(since, depth.values, strict=True)
+    ]
+    frozen = replace(pull.recording, depth=replace(depth, values=values))
+    pictures = release_pictures(replace(pull, recording=frozen), params.setup.fork_width)
+    assert pictures.never and pictures.beyond == 0 and pictures.frozen
+    for case in (pictures, replace(pictures, repeated=())):
+        (message,) = of_release(case)
+        assert message.refused
+
+
+@pytest.mark.fires("release_pictures")
+def test_impossible_pictures_are_said() -> None:
+    late = replace(SOUND, drawn=0.06, gone=0.09, earliest=0.045, latest=0.09)
+    again = replace(SOUND, again=(0.15,))
+    message = [finding.about for odd in (late, again) for finding in of_release(odd)]
+    assert message == ["release_pictures", "release_pictures"]
+    assert not list(of_release(SOUND)) and np.isclose(SOUND.error, 0.05 / np.sqrt(12))

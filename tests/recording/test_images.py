@@ -15,8 +15,7 @@ from sling2sim2real.base.errors import UserError
 from sling2sim2real.recording.camera import Calibration, Camera, camera_from
 from sling2sim2real.recording.images import Undecodable, color, depth
 from sling2sim2real.recording.messages import Picture
-from tests.recording.conftest import whole_of
-from tests.recording.made import of_pictures
+from tests.recording.conftest import of_pictures, whole_of
 from validation.recordings.bag import Lens, write_bag
 from validation.recordings.small import TRUTH, small_params
 

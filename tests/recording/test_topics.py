@@ -29,48 +29,50 @@ def head(k: int, frame: str = "base") -> dict:
     return {"header": {"stamp": {"sec": 5, "nanosec": round(1e9 * TIMES[k])}, "frame_id": frame}}
 
 
-def channel(name: str, kind: str, messages: list[dict], rate: float = RATE) -> Topic:
-    topic = Topic.of(name, Schema(1, b"{}", "jsonschema", kind), "json")
-    for k, message in enumerate(messages):
-        topic.add(5_000_000_000 + round(1e9 * k / rate), json.dumps(message).encode())
-    return topic
-
-
-def wrench(topic: str, rate: float = 1000.0, count: int = COUNT) -> Topic:
-    messages = [{**head(k, "sensor"), "wrench": {"force": FORCE}} for k in range(count)]
-    return channel(topic, "geometry_msgs/WrenchStamped", messages, rate)
-
-
 def pose_fields(pose: np.ndarray) -> dict:
     position = dict(zip("xyz", pose[:3], strict=True))
     return {"position": position, "orientation": dict(zip("xyzw", pose[3:], strict=True))}
 
 
+ONE = [pose_fields(values) for values in POSES]
+
+
+def channel(
+    name: str, kind: str, bodies: list[dict], rate: float = RATE, frame: str = "base"
+) -> Topic:
+    """Messages without their headers."""
+    topic = Topic.of(name, Schema(1, b"{}", "jsonschema", kind), "json")
+    for k, body in enumerate(bodies):
+        message = json.dumps({**head(k, frame), **body}).encode()
+        topic.add(5_000_000_000 + round(1e9 * k / rate), message)
+    return topic
+
+
+def wrench(topic: str, rate: float = 1000.0, count: int = COUNT) -> Topic:
+    bodies = [{"wrench": {"force": FORCE}}] * count
+    return channel(topic, "geometry_msgs/WrenchStamped", bodies, rate, "sensor")
+
+
 def pose(topic: str = "/arm/current_pose", rate: float = RATE) -> Topic:
-    messages = [{**head(k), "pose": pose_fields(POSES[k])} for k in range(COUNT)]
-    return channel(topic, "geometry_msgs/msg/PoseStamped", messages, rate)
+    return channel(topic, "geometry_msgs/msg/PoseStamped", [{"pose": one} for one in ONE], rate)
 
 
 def joints(topic: str, names: list[str], positions: np.ndarray) -> Topic:
-    messages = [
-        {**head(k, ""), "name": names, "position": list(positions[k])} for k in range(COUNT)
-    ]
-    return channel(topic, "sensor_msgs/msg/JointState", messages)
+    bodies = [{"name": names, "position": list(row)} for row in positions]
+    return channel(topic, "sensor_msgs/msg/JointState", bodies, frame="")
 
 
 def picture(topic: str, encoding: str, frame: str, width: int = 4, height: int = 2) -> Topic:
-    size = {"rgb8": 3, "bayer_rggb8": 1, "16UC1": 2, "mono8": 1}[encoding]
-    fields = {"height": height, "width": width, "step": size * width, "encoding": encoding}
-    messages = [
-        {**head(k, frame), **fields, "data": [0] * (size * width * height)} for k in range(3)
-    ]
-    return channel(topic, "sensor_msgs/msg/Image", messages, 30)
+    step = width * {"rgb8": 3, "bayer_rggb8": 1, "16UC1": 2, "mono8": 1}[encoding]
+    body = {"height": height, "width": width, "step": step, "encoding": encoding}
+    body["data"] = [0] * (step * height)
+    return channel(topic, "sensor_msgs/msg/Image", [body] * 3, 30, frame)
 
 
 def info(topic: str, frame: str, focal: float = 50.0, width: int = 4, height: int = 2) -> Topic:
     k = [focal, 0, 2, 0, focal, 1, 0, 0, 1]
-    message = {"width": width, "height": height, "k": k, "d": [], "p": [], "distortion_model": ""}
-    return channel(topic, "sensor_msgs/msg/CameraInfo", [{**head(0, frame), **message}] * 2, 30)
+    body = {"width": width, "height": height, "k": k, "d": [], "p": [], "distortion_model": ""}
+    return channel(topic, "sensor_msgs/msg/CameraInfo", [body] * 2, 30, frame)
 
 
 CAMERA = (
@@ -296,20 +298,11 @@ def test_a_topic_that_cannot_be_read_is_named_if_nothing_else_will_do(
     assert chosen(params, other, wrench("/ft2"), pose())["wrench"].topic.name == "/ft2"
 
 
-def in_frame(k: int, *poses: dict) -> dict:
-    return {"timestamp": head(k)["header"]["stamp"], "frame_id": "base", "poses": [*poses]}
-
-
-ONE = [pose_fields(values) for values in POSES]
 HANDS = {
-    "geometry_msgs/PoseStamped": [{**head(k), "pose": ONE[k]} for k in range(COUNT)],
-    "geometry_msgs/PoseWithCovarianceStamped": [
-        {**head(k), "pose": {"pose": ONE[k], "covariance": []}} for k in range(COUNT)
-    ],
-    "nav_msgs/Odometry": [
-        {**head(k), "child_frame_id": "tcp", "pose": {"pose": ONE[k]}} for k in range(COUNT)
-    ],
-    "foxglove.PosesInFrame": [in_frame(k, ONE[k]) for k in range(COUNT)],
+    "geometry_msgs/PoseStamped": [{"pose": one} for one in ONE],
+    "geometry_msgs/PoseWithCovarianceStamped": [{"pose": {"pose": one}} for one in ONE],
+    "nav_msgs/Odometry": [{"child_frame_id": "tcp", "pose": {"pose": one}} for one in ONE],
+    "foxglove.PosesInFrame": [{"poses": [one]} for one in ONE],
 }
 
 
@@ -325,7 +318,7 @@ def test_a_hand_of_each_type(params, kind) -> None:
 
 
 def test_one_of_several_poses_is_not_guessed(params) -> None:
-    several = [in_frame(k, ONE[k], ONE[k]) for k in range(COUNT)]
+    several = [{"poses": [one, one]} for one in ONE]
     with pytest.raises(UserError, match="/hand has fewer than two readable messages"):
         chosen(params, wrench("/ft"), channel("/hand", "foxglove.PosesInFrame", several))
 
@@ -343,14 +336,10 @@ def test_a_hand_that_is_in_tf_alone(params) -> None:
     back = first.inv()
     second = np.hstack([back.apply(PLACES - place), (back * TURNS).as_quat()])
     tool = np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0])
+    links = np.hstack([np.tile(place, (COUNT, 1)), first.as_quat()])
     moving = [
-        {
-            "transforms": [
-                stamped(k, "base", "link1", np.append(place, first[k].as_quat())),
-                stamped(k, "link1", "hand", second[k]),
-            ]
-        }
-        for k in range(COUNT)
+        {"transforms": [stamped(k, "base", "link1", a), stamped(k, "link1", "hand", b)]}
+        for k, (a, b) in enumerate(zip(links, second, strict=True))
     ]
     still = [{"transforms": [stamped(0, "hand", "hand_tcp", tool)]}]
     topics = [
@@ -375,39 +364,30 @@ def test_a_type_is_added_in_one_place(params, monkeypatch) -> None:
     assert_poses(played(chosen(params, wrench("/ft"), channel("/h", "a/Hand", sent))["pose"])[1])
 
 
-def franka(kind: str, frame: str, states: list[dict]) -> Topic:
-    return channel("/state", f"franka_msgs/{kind}", [{**head(k, frame), **s} for k, s in states])
-
-
-def robot_states() -> list:
-    """FrankaRobotState, which is of messages with frames of their own."""
-    force = {**head(0, "link0"), "wrench": {"force": FORCE}}
-    return [
-        (k, {"o_f_ext_hat_k": force, "o_t_ee": {**head(0, "link0"), "pose": ONE[k]}})
-        for k in range(COUNT)
-    ]
-
-
-def old_states(*names: str) -> list:
-    """FrankaState, of column-major matrices and numbers."""
-    matrices = np.tile(np.eye(4), (COUNT, 1, 1))
-    matrices[:, :3, :3], matrices[:, :3, 3] = TURNS.as_matrix(), PLACES
-    return [
-        (k, dict(zip(names, (list(matrix.T.ravel()), [1, 2, 3] * 2), strict=True)))
-        for k, matrix in enumerate(matrices)
-    ]
-
-
-@pytest.mark.parametrize(
-    ("kind", "frame", "states", "base"),
-    [
-        ("FrankaRobotState", "link0", robot_states(), "link0"),
-        ("FrankaState", "", old_states("O_T_EE", "O_F_ext_hat_K"), "franka_base"),
-        ("FrankaState", "link0", old_states("o_t_ee", "o_f_ext_hat_k"), "link0"),
+MATRICES = np.tile(np.eye(4), (COUNT, 1, 1))
+MATRICES[:, :3, :3], MATRICES[:, :3, 3] = TURNS.as_matrix(), PLACES
+SIX = [1, 2, 3] * 2
+FRANKAS = {  # by kind, frame of the state, and that of its base: messages, matrices by columns
+    ("FrankaRobotState", "link0", "link0"): [
+        {
+            "o_f_ext_hat_k": {**head(0, "link0"), "wrench": {"force": FORCE}},
+            "o_t_ee": {**head(0, "link0"), "pose": one},
+        }
+        for one in ONE
     ],
-)
-def test_a_franka_is_pose_and_for_lack_of_a_sensor_force(params, kind, frame, states, base) -> None:
-    state = franka(kind, frame, states)
+    ("FrankaState", "", "franka_base"): [
+        {"O_T_EE": list(matrix.T.ravel()), "O_F_ext_hat_K": SIX} for matrix in MATRICES
+    ],
+    ("FrankaState", "link0", "link0"): [
+        {"o_t_ee": list(matrix.T.ravel()), "o_f_ext_hat_k": SIX} for matrix in MATRICES
+    ],
+}
+
+
+@pytest.mark.parametrize("franka", FRANKAS)
+def test_a_franka_is_pose_and_for_lack_of_a_sensor_force(params, franka) -> None:
+    kind, frame, base = franka
+    state = channel("/state", f"franka_msgs/{kind}", FRANKAS[franka], frame=frame)
     roles = chosen(params, state)
     (of_pose, poses), (of_force, forces) = (played(roles[role]) for role in ("pose", "wrench"))
     assert of_pose == of_force == base

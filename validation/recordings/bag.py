@@ -115,19 +115,6 @@ class Truth:
         return np.vstack(parts)
 
 
-def scores(episode: object, truth: Truth) -> tuple[np.ndarray, float]:
-    """Distances of all points from the band's surface [m], and the covered share of the drawn."""
-    off, covered = [], []
-    for time, cloud in zip(episode.cloud_time, episode.clouds, strict=True):
-        line = truth.center_line(time)
-        gaps = np.linalg.norm(cloud[:, None] - line[None], axis=-1)
-        off.append(gaps.min(axis=1) - RADIUS)
-        if truth.drawn < time < truth.release - 0.01:
-            away = np.linalg.norm(line - truth.hand(time), axis=1) > 0.035
-            covered.append(np.mean(gaps.min(axis=0)[away] < 3 * RADIUS))
-    return np.concatenate(off), float(np.mean(covered))
-
-
 class RosWriter:
     """Messages of ROS 2 in CDR; `finish` ends the file."""
 
@@ -152,7 +139,6 @@ def write_bag(
     path: Path,
     truth: Truth | None = None,
     *,
-    without: tuple[str, ...] = (),
     change: Callable[[str, int, object], object] = lambda kind, t, message: message,
     cameras: bool = True,
     rate: int = 1000,
@@ -166,7 +152,6 @@ def write_bag(
     Args:
         path: The file.
         truth: What is played.
-        without: Kinds of topics to leave out.
         change: (kind, stamp, message) to the message as it is written, None to drop it.
         cameras: Without them the pictures are there but black, which is faster.
         rate, pose_rate: Messages a second.
@@ -181,14 +166,9 @@ def write_bag(
         writer = RosWriter(file, **{"chunk_size": 200_000, **options})
 
         def write(kind: str, topic: str, t: float, delay: float, body: dict, frame: str) -> None:
-            if kind in without:
-                return
             stamp = START + round(t * 1e9)
-            if kind == "tf":
-                message = Message(**body)
-            else:
-                message = Message(header=head(stamp, frame), **body)
-            message = change(kind, stamp, message)
+            header = {} if kind == "tf" else {"header": head(stamp, frame)}
+            message = change(kind, stamp, Message(**header, **body))
             if message is not None:
                 late = START + round(receive(kind, t, delay) * 1e9)
                 writer.write(topic, TYPES[kind], late, message)

@@ -76,7 +76,7 @@ def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
         return not 1.3 < (stamp - START) * 1e-9 < 1.35
 
     path = tmp_path / "poor.mcap"
-    write_bag(path, Truth(noise=0.6), rate=500, without=("gripper",), change=edit(wrench=lose))
+    write_bag(path, Truth(noise=0.6), rate=500, change=edit(wrench=lose, gripper=lambda *_: False))
     report = look_at(path, with_(params, "setup", max_force=15.0), band_of(params)).report
     assert report["problem"] is None
     output = {"gripper", "rate", "gap", "pause", "max_force"}
@@ -106,7 +106,7 @@ def test_the_choice_of_topics_can_be_pasted(looked) -> None:
 
 
 def test_the_report_of_a_bad_recording(tmp_path, params) -> None:
-    path = blind_bag(tmp_path, without=("wrench",))
+    path = blind_bag(tmp_path, change=edit(wrench=lambda *_: False))
     report = look_at(path, params, band_of(params)).report
     assert "no force" in json.loads(to_json(report))["problem"]
     assert "cannot be used: no force" in to_text(report)

@@ -252,8 +252,7 @@ def sentence(content: dict) -> list[str]:
     kind = content["figures"]["informative, virgin"]
     means, count = kind["together"], kind["settled"][1]
     size, worst, inside, width = (
-        100 * means[key]
-        for key in ("mean_size_of_bias", "worst_bias", "coverage", "median_width")
+        100 * means[key] for key in ("mean_size_of_bias", "worst_bias", "coverage", "median_width")
     )
     least = 100 * means["least_coverage"]
     text = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 from validation.engines import mujoco_flex
-from validation.simulator.experiment import setup_of
+from validation.simulator.experiment import band_of, setup_of
 from validation.simulator.finding import Bench, Measure, Theme
 from validation.synthetic import ease, unseen
 
@@ -98,7 +98,7 @@ def pull(bench: Bench, theta, step: float = 5e-4, **mesh) -> EnginePull:
     Raises:
         UserError: MuJoCo is not installed.
     """
-    sling = sling_of(bench)
+    sling = band_of(bench)
     episode = episode_of(sling)
     theirs = mujoco_flex.interact(sling, episode, theta, step, **mesh)
     ours = interact(sling, episode, damped(theta), device=bench.device)
@@ -140,7 +140,7 @@ def pull_checks(result: EnginePull, title: str) -> list[Measure]:
 
 def launch_check(bench: Bench, cases=LAUNCHES, step: float = 2.5e-4) -> Measure:
     """The largest difference of the landings of `cases`, as listed in LAUNCHES."""
-    sling, setup = sling_of(bench), setup_of(bench)
+    sling, setup = band_of(bench), setup_of(bench)
     thetas = np.array([[young, poisson, d, 1.0, 1.0] for young, poisson, d, _ in cases])
     draws = np.array([draw for *_, draw in cases])
     ours = launch(sling, setup, damped(thetas), draws, device=bench.device)
@@ -175,13 +175,6 @@ def section(bench: Bench) -> Theme:
         title = f"Poisson's ratio {poisson:.2f}, {900 * rings**2} tetrahedra"
         checks += pull_checks(pull(bench, theta, rings=rings), title)
     return Theme("Against MuJoCo", [*checks, launch_check(bench)], TEXT)
-
-
-def sling_of(bench: Bench) -> ClampedBand:
-    """The first band of params.yaml, mounted as `setup` says."""
-    params = bench.params
-    sling = ClampedBand.of(params.bands[next(iter(params.bands))], params.setup, params.sling)
-    return replace(sling, air_density=0.0)  # MuJoCo has no air
 
 
 def damped(thetas: np.ndarray) -> Parameters:

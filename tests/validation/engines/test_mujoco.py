@@ -19,7 +19,7 @@ def held(bench):
 
 
 def test_its_law_is_ours(bench):
-    tube = Tube.of(checks.sling_of(bench), edges=4)
+    tube = Tube.of(checks.band_of(bench), edges=4)
     band = FlexBand(tube, checks.THETA, 5e-4)
     moved = tube.rest + 0.002 * np.random.default_rng(1).standard_normal(tube.rest.shape)
     band.data.qpos[:] = (moved - tube.rest).ravel()

@@ -21,14 +21,14 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 BUDGETS = {  # what was reached on 2026-11-28, plus 2 %; the whole plus 1 %
     "pipeline": 2_030,
-    "sling2sim2real": 20_780,
+    "sling2sim2real": 20_150,
     "stages": 460,
     "rig": 1_950,
-    "validation": 6_300,
-    "tests": 19_020,
-    "tools": 440,
+    "validation": 6_100,
+    "tests": 16_830,
+    "tools": 420,
     "examples": 530,
-    "all": 51_000,
+    "all": 47_960,
 }
 COMMENTS = {  # by suffix: what is no code
     ".h": re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL),

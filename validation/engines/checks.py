@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from sling2sim2real.simulator.model import ClampedBand
 from sling2sim2real.simulator.parameters import Parameters
 from sling2sim2real.simulator.rubber import NEO_HOOKEAN
 from validation.engines import mujoco_flex
-from validation.simulator.experiment import setup_of
+from validation.simulator.experiment import band_of, setup_of
 from validation.simulator.finding import Bench, Measure, Theme
 from validation.synthetic import ease, unseen
 
@@ -178,10 +178,8 @@ def section(bench: Bench) -> Theme:
 
 
 def sling_of(bench: Bench) -> ClampedBand:
-    """The first band of params.yaml, mounted as `setup` says."""
-    params = bench.params
-    sling = ClampedBand.of(params.bands[next(iter(params.bands))], params.setup, params.sling)
-    return replace(sling, air_density=0.0)  # MuJoCo has no air
+    """The proofs' band, mounted as `setup` says."""
+    return band_of(bench)  # without air, as MuJoCo
 
 
 def damped(thetas: np.ndarray) -> Parameters:

@@ -14,6 +14,7 @@ from sling2sim2real.simulator.schedule import Schedule, statics, steps
 from sling2sim2real.simulator.solver import Frames, Options, Slings, run
 from validation.simulator.finding import Bench
 
+SIZES = {"mass": 0.023, "diameter": 0.010, "rest_length": 0.52}  # for which the limits were set
 TIGHT = {"double": True, "tolerance": 1e-12}  # the kernel as exact as it gets
 
 
@@ -39,9 +40,9 @@ class Trajectories:
 
 
 def band_of(bench: Bench) -> ClampedBand:
-    """The first band of params.yaml as a solid rod of the default resolution, without air."""
+    """The proofs' own band as a solid rod of the default resolution, without air."""
     params = bench.params
-    band = params.bands[next(iter(params.bands))]
+    band = next(iter(params.bands.values())).model_copy(update=SIZES)
     sling = ClampedBand.of(band, params.setup, params.sling)
     return replace(sling, air_density=0.0)
 

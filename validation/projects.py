@@ -39,6 +39,7 @@ ROUGH = {  # keys of `sling` for a fast simulation
 }
 TINY = {  # keys of params.yaml for a whole run of a band in minutes
     "cloud.points": 100,
+    "cloud.sampling": "after_filters",  # so few farthest points would all count as strays
     **{f"sling.{name}": value for name, value in ROUGH.items()},
     "optimizer.population": 6,
     "optimizer.generations": 2,

@@ -25,10 +25,18 @@ class Section:
     def __getattr__(self, name: str) -> object:
         if name == "model_dump_json":  # a memory's fingerprint: no result depends on it
             return self._section.model_dump_json
+        if name == "model_dump":
+            return self._dumped
         if name not in type(self._section).model_fields:  # another method may read everything
             note(self._path)
             return getattr(self._section, name)
         return noted(getattr(self._section, name), f"{self._path}.{name}".lstrip("."))
+
+    def _dumped(self, **options: object) -> dict:
+        """What its `model_dump` gives, each leaf of which is read."""
+        content = self._section.model_dump(**options)
+        note_leaves(content, self._path)
+        return content
 
     def __iter__(self) -> Iterator[tuple[str, object]]:
         return ((name, getattr(self, name)) for name in type(self._section).model_fields)
@@ -51,6 +59,15 @@ class Entries(Mapping):
 
     def __ror__(self, first: dict) -> dict:
         return {**first, **self}
+
+
+def note_leaves(value: object, path: str) -> None:
+    """Note all that lies below a value."""
+    if not (isinstance(value, dict) and value):
+        note(path)
+        return
+    for name, part in value.items():
+        note_leaves(part, f"{path}.{name}".lstrip("."))
 
 
 def noted(value: object, path: str) -> object:

@@ -1,1 +1,1 @@
-"""Other engines that `engine:` and `sling export` may name, each an entry point."""
+"""Other engines that `engine:` and `sling export` may name."""

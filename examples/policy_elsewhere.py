@@ -1,6 +1,6 @@
 """Ask an exported policy for a draw, on a machine that does not have this project.
 
-    python policy_elsewhere.py FOLDER TARGET      # such as data/policies/band1/posterior 1.925
+    python policy_elsewhere.py FOLDER TARGET      # such as data/policies/band1-posterior 1.925
 
 Wants onnxruntime and NumPy alone. FOLDER holds policy.onnx and card.json, which a run exported.
 """

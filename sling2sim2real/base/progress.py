@@ -1,4 +1,4 @@
-"""What everything long says of itself: lines in logs/ and on stderr.
+"""What everything long says of itself: lines in logs/ and on stderr, on a terminal a bar.
 
     history-band1-de 48/600 rollouts  generation 4  best 0.43215  12.3 rollouts/s  0:45 left
 
@@ -13,6 +13,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+BAR = 30  # characters
 LINE = re.compile(r"(?P<title>\S+) (?P<done>\d+)/(?P<total>\d+) (?P<unit>\w+)(?:  (?P<facts>.*))?")
 
 
@@ -95,7 +96,14 @@ class Progress:
 
     def _tell(self, step: Step) -> None:
         self._write(step.counted)
-        print(step, file=sys.stderr, flush=True)
+        if not sys.stderr.isatty():
+            print(step, file=sys.stderr, flush=True)
+            return
+        filled = BAR * step.done // step.total
+        bar = "#" * filled + "-" * (BAR - filled)
+        end = "\n" if step.done >= step.total else ""
+        shown = f"\r{step.title} [{bar}] {step.counted}\x1b[K"
+        print(shown, end=end, file=sys.stderr, flush=True)
 
     def _write(self, line: str) -> None:
         with self.log.open("a", encoding="utf-8") as file:

@@ -97,6 +97,7 @@ def fit(
         found = _with_policy(folder, found, steps)
     steps.begin(CARD)
     card = _card(folder, found, episodes)
+    steps.finish()
     _forget(folder)
     return card | {"card": str(folder.card / "README.md")}
 

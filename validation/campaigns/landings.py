@@ -257,9 +257,9 @@ def sentence(content: dict) -> list[str]:
     least = 100 * means["least_coverage"]
     text = (
         f"On {len(kind['bands'])} held-out virtual rubbers, with dips ({count} recordings),"
-        f" predictions are off by {size:.1f} % of the distance (mean over recordings;"
-        f" {abs(worst):.1f} % at worst), and {inside:.0f} % of the launches land in 90 % intervals,"
-        f" which are {width:.0f} % wide; of the least covered rubber {least:.0f} % do."
+        f" predictions are off by {size:.1f} % of the distance (at worst {abs(worst):.1f} %). Of"
+        f" the launches {inside:.0f} % land in 90 % intervals, which are {width:.0f} % wide; of the"
+        f" least covered rubber {least:.0f} % do."
     )
     return paragraph(text)
 
